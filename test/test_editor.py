@@ -20,6 +20,8 @@ from test_fit_broken import BROKEN  # noqa: E402
 
 from ragdoll_ros.files.doll import load_doll, save_doll  # noqa: E402
 from ragdoll_ros.files.scene import load_scene, save_scene  # noqa: E402
+from ragdoll_ros.fit.judging.finding import Finding  # noqa: E402
+from ragdoll_ros.fit.judging.verdict import Verdict  # noqa: E402
 from ragdoll_ros.model import errors, rotation  # noqa: E402
 from ragdoll_ros.model.scene import above_ground  # noqa: E402
 from ragdoll_ros.physics.simulation import Simulation  # noqa: E402
@@ -29,6 +31,7 @@ from ragdoll_ros.viewer.editor.editor import Editor  # noqa: E402
 from ragdoll_ros.viewer.sources.playback import PlaybackSource  # noqa: E402
 from ragdoll_ros.viewer.sources.simulation import SimulationSource  # noqa: E402
 from ragdoll_ros.viewer.sources.source import RequestedData  # noqa: E402
+from ragdoll_ros.viewer.widgets.form import AMBER, GREEN, RED  # noqa: E402
 
 DROP = load_scene('drop')
 
@@ -657,6 +660,19 @@ def test_uploads_have_a_size(desk, monkeypatch):
     for take in (desk.files.upload, desk.files.fit):
         take('large.glb', bytes(1001))
         assert 'at most 1000' in desk.said()
+
+
+@pytest.mark.parametrize(('findings', 'color', 'word'), [
+    ((), GREEN, 'good'), ((Finding('a joint hangs'),), AMBER, 'doubtful'),
+    ((Finding('a joint hangs'), Finding('no root', wrong=True)), RED, 'wrong')])
+def test_a_verdict_has_the_colour_of_what_it_says(desk, monkeypatch, findings, color, word):
+    scene = load_scene('drop')
+    monkeypatch.setattr(desk.files._folder, 'fit', lambda *_: (scene, [Verdict(findings)]))
+    desk.files.fit('x.glb', b'')
+    lines = desk.said().split('</div>')
+    assert color in lines[1] and f'verdict: {word}' in lines[1]
+    for finding, line in zip(findings, lines[2:], strict=False):
+        assert finding.sentence in line and (RED if finding.wrong else AMBER) in line
 
 
 @pytest.mark.parametrize('rig', ['mixamo', 'centimetres'])

@@ -11,6 +11,7 @@ from screen import Screen
 
 from ragdoll_ros.ros import node, run
 from ragdoll_ros.ros.teleop import teleop
+from ragdoll_ros.ros.teleop.teleop import show, show_line
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
 
@@ -95,6 +96,15 @@ def test_run_shows_a_live_line_and_the_arrows_push(ros):
     screen.type(b'q')
     process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
+
+
+def test_a_long_line_of_the_log_is_shown_whole(capsys, monkeypatch):
+    """On a terminal of 20 columns, in place of the status line, which is cut to fit."""
+    monkeypatch.setenv('COLUMNS', '20')
+    show('RTF 1.00  ' + 'x' * 30)
+    show_line('scene drop: ' + 'y' * 30)
+    status, _, log = capsys.readouterr().out.rpartition('\r')
+    assert 'x' * 10 not in status and log == '\x1b[Kscene drop: ' + 'y' * 30 + '\n'
 
 
 def test_without_a_terminal_the_line_is_logged_each_second(ros):

@@ -210,6 +210,21 @@ def test_a_node_that_is_paused_is_seen_as_it_stands(node, remote, peer):
     late.close()
 
 
+def test_swings_of_a_paused_node_are_seen_by_who_comes_late(node, remote, peer):
+    assert set_parameters(peer, scene='ponytail')
+    remote.request(OPEN)
+    seen(remote, 'ponytail')
+    wait(lambda: remote.frame.rods is not None and remote.frame.time > 0.2)
+    remote.pause(True)
+    wait(lambda: remote.status.paused)
+    late = NodeSource([])
+    late.request(OPEN)
+    seen(late, 'ponytail')
+    wait(lambda: late.frame.rods is not None and late.frame.time == remote.frame.time)
+    wait(lambda: np.array_equal(late.frame.rods, remote.frame.rods))
+    late.close()
+
+
 def test_steers_the_node(node, remote):
     remote.request(OPEN)
     seen(remote)
@@ -456,6 +471,7 @@ def test_an_open_page_follows_a_node_that_comes_back_with_another_scene(
     wait(lambda: page.frame.grabs)
     kill(node)
     wait(lambda: 'silent' in page.problem.content and 'start it again' in page.problem.content)
+    wait(lambda: 'No messages' in page.settings.health.dot.content)
     start('node', '--ros-args', '-p', 'scene:=crowd')
     wait(lambda: page.stage.scene == load_scene('crowd'))
     wait(lambda: not page.problem.content)

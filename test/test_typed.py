@@ -84,3 +84,4 @@ def test_what_is_shown_is_read_as_what_is_shown():
         assert parse_number(format_number(value)) == pytest.approx(value, rel=6e-7, abs=0)
     assert [format_number(value) for value in (70.0, 1e9, 1e-9, 0.1, -0.0)] == [
         '70', '1e9', '1e-9', '0.1', '0']
+    assert format_number(1.436107e-31) == format_number(-1.2e-16) == '0'

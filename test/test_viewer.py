@@ -381,6 +381,7 @@ def test_a_pointer_that_points_nowhere_moves_nothing(page, phase, number):
     wait(lambda: not page.frame.grabs and page.frame.time > since + 0.1)
     assert np.isfinite(page.frame.state.positions).all()
     assert np.abs(page.frame.state.positions).max() < 10
+    assert not page.source.status.problem
 
 
 def test_a_click_chooses_the_bone_for_the_editor(page):

@@ -48,6 +48,22 @@ def places_of(port):
     return [place for place in listening if place.endswith(f':{port:04X}')]
 
 
+def test_a_character_is_no_scene_and_how_to_make_one_is_said(tmp_path):
+    path = tmp_path / 'fox.glb'
+    path.write_bytes(b'glTF' + bytes(range(128, 256)))
+    done = run('--scene', str(path), '--port', '0')
+    assert done.returncode == 2 and f'ragdoll_fit {path}' in done.stderr
+    assert 'utf-8' not in done.stderr
+
+
+def test_what_cannot_be_played_leaves_no_folder(tmp_path):
+    (tmp_path / 'bad.mcap').write_text('bad')
+    done = subprocess.run([*COMMAND, '--play', str(tmp_path / 'bad.mcap')], capture_output=True,
+                          text=True, cwd=ROOT, env={**light(), 'HOME': str(tmp_path)},
+                          timeout=PATIENCE)
+    assert done.returncode == 2 and [path.name for path in tmp_path.iterdir()] == ['bad.mcap']
+
+
 SIGNS = pytest.mark.parametrize('sign', [signal.SIGINT, signal.SIGTERM])
 
 

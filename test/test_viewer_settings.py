@@ -13,9 +13,11 @@ from page_client import served, wait
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.accuracy import ACCURACIES
-from ragdoll_ros.viewer.settings_panel import ERRORS_MM, health_line
+from ragdoll_ros.viewer.health import GRACE, figures, health
+from ragdoll_ros.viewer.settings_panel import ERRORS_MM
 from ragdoll_ros.viewer.sources.simulation import SimulationSource, TickStatistics
 from ragdoll_ros.viewer.sources.source import RequestedData, SourceStatus
+from ragdoll_ros.viewer.widgets.form import AMBER, GREEN, GREY, RED
 
 DROP = load_scene('drop')
 WEIGHT = 9.8 * sum(bone.mass for bone in DROP.bones)
@@ -39,24 +41,46 @@ def test_the_tempo_of_ticks():
     assert statistics.mean_cost == pytest.approx(0.005)
 
 
-@pytest.mark.parametrize(('changes', 'reason'), [
-    ({}, ''),
-    ({'paused': True, 'measured_real_time_factor': 0.1}, ''),
-    ({'measured_real_time_factor': 0.6, 'tick_cost': 0.016}, 'use accuracy draft'),
-    ({'measured_real_time_factor': 0.6}, 'the machine is busy'),
-    ({'measures': {'energy_excess_J': 0.0011 * WEIGHT}}, 'energy error: use accuracy exact'),
-    ({'measures': {'energy_excess_J': 0.0011 * WEIGHT, 'work_of_pushes_J': WEIGHT}}, ''),
-    ({'measures': {'energy_excess_J': -300.0}}, '')])
-def test_health_warns_with_a_reason(changes, reason):
-    status = dataclasses.replace(
-        SourceStatus(measured_real_time_factor=0.99, tick_cost=2e-4), **changes)
-    line, warns = health_line(status, DROP)
-    assert warns == bool(reason) and reason in line
-    assert ('real-time factor' in line) != status.paused
+WELL = SourceStatus(measured_real_time_factor=0.99, tick_cost=2e-4)
+
+
+@pytest.mark.parametrize(('changes', 'color', 'reason'), [
+    ({}, GREEN, 'Running'),
+    ({'paused': True, 'measured_real_time_factor': 0.1}, GREEN, 'Paused'),
+    ({'measured_real_time_factor': 0.6, 'tick_cost': 0.016}, AMBER, 'Use accuracy draft'),
+    ({'measured_real_time_factor': 0.6}, AMBER, 'the machine is busy'),
+    ({'measures': {'energy_excess_J': 0.0011 * WEIGHT}}, RED, 'Use accuracy exact'),
+    ({'measures': {'energy_excess_J': 0.0011 * WEIGHT, 'work_of_pushes_J': WEIGHT}}, GREEN, ''),
+    ({'measures': {'energy_excess_J': -300.0}}, GREEN, ''),
+    ({'problem': 'the state was not finite'}, RED, 'not finite'),
+    ({'problem': 'the node has ended', 'silent': True}, GREY, 'No messages')])
+def test_health_has_a_colour_and_a_reason(changes, color, reason):
+    status = dataclasses.replace(WELL, **changes)
+    found = health(status, DROP)
+    assert found.color == color and reason in found.text
+    assert ('real-time factor' in figures(status, DROP)) != status.paused
 
 
 def test_nothing_is_said_of_a_source_that_does_not_compute():
-    assert health_line(SourceStatus(), DROP) == ('', False)
+    assert health(SourceStatus(), DROP) is None and figures(SourceStatus(), DROP) == ''
+
+
+def test_nothing_alarms_at_once_and_silence_is_grey(page):
+    """After a resume, another pace and another scene, a while; what lasts is said then."""
+    slow = dataclasses.replace(WELL, measured_real_time_factor=0.1)
+    panel, now = page.settings.health.__class__(page.server.gui), 100.0
+    for changes, scene in (({}, DROP), ({'paused': True}, DROP), ({}, DROP),
+                           ({'real_time_factor': 0.5}, DROP), ({}, load_scene('flight'))):
+        status = dataclasses.replace(slow, **changes)
+        panel.show(status, scene, now)
+        assert GREEN in panel.dot.content
+        panel.show(status, scene, now + 0.9 * GRACE)
+        assert GREEN in panel.dot.content
+        panel.show(status, scene, now + 1.1 * GRACE)
+        assert (AMBER in panel.dot.content) != status.paused
+        now += 100
+    panel.show(dataclasses.replace(slow, silent=True), DROP, now)
+    assert GREY in panel.dot.content and 'No messages' in panel.dot.content
 
 
 def test_errors_are_those_of_the_report():
@@ -87,18 +111,27 @@ def test_what_is_said_of_a_scene_is_not_of_the_one_before():
 
 
 def test_the_accuracy_by_the_dropdown_and_its_price(page):
-    wait(lambda: 'ms per tick' in page.settings.cost.content)
+    wait(lambda: ' ms. Typical error' in page.settings.cost.content)
     assert '0.2 mm' in page.settings.cost.content
     page.source.set_engine('bullet')
     wait(lambda: '13 mm' in page.settings.cost.content)
     page.source.set_engine('auto')
-    wait(lambda: any(word in page.settings.health.content for word in ('real-time factor', 'tick')))
+    wait(lambda: 'tick' in page.settings.health.figures.content)
+    assert GREEN in page.settings.health.dot.content
     page.client.update(page.settings.accuracy, 'exact')
     wait(lambda: page.source.status.accuracy == 'exact')
     wait(lambda: '0.02 mm' in page.settings.cost.content)
     assert page.frame.scene is DROP, 'it goes on'
     page.source.load('flight')
     assert page.source.status.accuracy == 'exact'
+
+
+def test_a_factor_is_typed_digit_by_digit(page, capfd):
+    """0, which is none, is passed over on the way to 0.5."""
+    for value in (0, 0.5):
+        page.client.update(page.controls.real_time_factor, value)
+    wait(lambda: page.source.status.real_time_factor == 0.5)
+    assert 'Traceback' not in capfd.readouterr().err and not page.source.status.problem
 
 
 def test_gravity_and_ground_as_typed(page):
@@ -115,6 +148,7 @@ def test_gravity_and_ground_as_typed(page):
 
 
 @pytest.mark.parametrize(('key', 'text', 'word'), [
+    ('gravity', '0 0 -1e9', 'gravity must be -1000 to 1000'),
     ('gravity', 'abc', '3 numbers'), ('friction', 'x', 'a number'),
     ('restitution', '', 'a number'), ('friction', '-1', 'scene friction must be 0 to inf, not -1'),
     ('restitution', '1.5', 'restitution must be 0 to 1, not 1.5')])

@@ -30,6 +30,10 @@ _Loader.add_implicit_resolver(
     list('-+0123456789'))
 
 
+CHARACTERS = ('.glb', '.gltf', '.vrm', '.urdf', '.xacro')
+"""Suffixes of files from which `ragdoll_fit` makes dolls."""
+
+
 def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
     """An int; infinite if it exceeds a float, as 1e400 is, to be refused as such."""
     number = loader.construct_yaml_int(node)
@@ -45,6 +49,9 @@ _Loader.add_constructor('tag:yaml.org,2002:int', _whole_number)
 
 def read(path: Path) -> object:
     """Data of a YAML file. Raises Unreadable."""
+    if path.suffix.lower() in CHARACTERS:
+        raise errors.Unreadable('', path.name, 'a scene or a doll in YAML, which '
+                                f'`ragdoll_fit {path}` makes of a character or a robot')
     if path.stat().st_size > LARGEST_FILE:
         raise errors.Unreadable('', f'{path.stat().st_size} bytes', f'at most {LARGEST_FILE}')
     try:

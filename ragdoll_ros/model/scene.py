@@ -24,6 +24,9 @@ SECOND = 1_000_000_000
 STEP_RANGE = (0.0002, 0.2)
 """Shortest and longest tick, s."""
 
+MAX_GRAVITY = 1000.0
+"""Largest component of gravity, m/s^2: a hundred times the earth's, four times the sun's."""
+
 NO_SLIP = 0.7
 """Coefficient for unlimited friction in PyBullet and MuJoCo: no slip up to 35 degrees. PyBullet's
 solver alternates between normal and friction; where friction opens the contact (above 4/3 for a
@@ -133,7 +136,7 @@ class Scene:
         dolls: at least one Placement, with different names.
         ground: None: no ground.
         material: contact parameters, by default no slip and restitution 0.5.
-        gravity: (3,) m/s^2, world frame.
+        gravity: (3,) m/s^2, world frame; each of -1000 to 1000.
         step: one tick, s, 0.0002 to 0.2.
         pace: real-time factor that the node starts with.
         self_collision: whether the bones of a doll collide with each other.
@@ -159,6 +162,8 @@ class Scene:
         set_fields(self, dolls=tuple(self.dolls), gravity=finite_floats('gravity', self.gravity))
         if not self.dolls:
             raise errors.WrongForm('dolls', (), 'at least one doll')
+        for value in self.gravity:
+            errors.check_range('gravity', value, -MAX_GRAVITY, MAX_GRAVITY)
         errors.check_range('step', self.step, *STEP_RANGE)
         errors.check_positive('pace', self.pace)
         names = [placement.name for placement in self.dolls]

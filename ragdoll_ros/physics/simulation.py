@@ -159,6 +159,11 @@ class Simulation:
         return float(self._engine.energy_excesses.sum())
 
     @property
+    def work(self) -> tuple[float, float]:
+        """Work of pushes and of hands since the start, J."""
+        return self._engine.work
+
+    @property
     def kinetic_energies(self) -> np.ndarray:
         """Kinetic energy of each doll (d,) J."""
         return self._engine.doll_totals.kinetic

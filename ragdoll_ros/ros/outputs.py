@@ -1,8 +1,11 @@
-"""Publishers of poses, state, joints, contacts, swings, markers, tf, /clock, robot_description."""
+"""Publishers of measures, poses, state, joints, contacts, swings, markers, tf, /clock, URDF."""
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -15,6 +18,7 @@ from visualization_msgs.msg import MarkerArray
 from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
 from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
+from .messages.measures import TickMeasures, checksum, serialize_measures
 from .messages.serialized import serialize_pose_array
 from .messages.templates import SceneTemplates
 from .messages.tf import TfPublisher
@@ -39,6 +43,9 @@ class Outputs:
         self._poses = node.create_publisher(PoseArray, '~/poses', LATCHED_HISTORY)
         self._state = node.create_publisher(MultiDOFJointState, '~/state', 10)
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
+        self._measures = node.create_publisher(DiagnosticArray, '~/measures', LATCHED_HISTORY)
+        self._run: tuple[Simulation | None, int, int] = (None, 0, 0)
+        """The simulation that was published last, its reset_count, and the number of that run."""
         self._swings: Publisher | None = None
         self._contacts = node.create_publisher(PoseArray, '~/contacts', 10)
         self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED_HISTORY)
@@ -51,54 +58,76 @@ class Outputs:
         self._templates, self._frame = SceneTemplates(scene, frame), frame
         self._set_swings_publisher(count_masses(scene) > 0)
         self._next_markers = 0
-        self._poses_pending = False
+        self._pending: list[Callable[[Simulation, int], None]] = []
+        """What has not published the last tick, for want of subscribers."""
         self._tf.set_scene(scene, frame, publish_tf)
-        self._description.publish(String(data=scene_to_urdf(scene, frame)))
+        description = scene_to_urdf(scene, frame)
+        self._urdf = checksum(description)
+        self._description.publish(String(data=description))
 
     @property
     def has_subscribers(self) -> bool:
         """Whether a topic that is published with each tick has a subscriber."""
-        topics = self._poses, self._state, self._joints, self._contacts, self._swings
+        topics = (self._measures, self._poses, self._state, self._joints, self._contacts,
+                  self._swings)
         return self._clock is not None or self._tf.has_subscribers or any(
             topic is not None and topic.get_subscription_count() for topic in topics)
 
     def publish(self, simulation: Simulation, stamp: int, now: int, paused: bool = False) -> None:
         """Publish the simulation's state with ``stamp``, ns, on topics with subscribers, markers at
-        most every MARKER_PERIOD by ``now``, ns of the steady clock.
+        most every MARKER_PERIOD by ``now``, ns of the steady clock; poses last, so that who has
+        them has the rest of the tick, too.
 
-        ``paused``: publish poses and markers without a subscriber as well, for late ones.
+        ``paused``: publish measures, swings, poses and markers without a subscriber, too, for late
+        ones.
         """
         self.publish_clock(stamp)
         self._tf.publish(simulation, stamp)
         templates = self._templates
-        if paused or self._poses.get_subscription_count():
-            self._publish_poses(simulation, stamp)
-        else:
-            self._poses_pending = True
         if self._state.get_subscription_count():
             state = simulation.state
             self._state.publish(templates.state.serialize(stamp, poses_of(state), twists_of(state)))
         if self._joints.get_subscription_count():
             self._joints.publish(templates.joints.serialize(
                 stamp, simulation.joint_angles, simulation.joint_rates))
-        if self._swings is not None and self._swings.get_subscription_count():
-            self._swings.publish(templates.swings.serialize(stamp, poses_of(simulation.swings)))
         if self._contacts.get_subscription_count():
             self._contacts.publish(serialize_pose_array(self._frame, stamp,
                                                         contact_poses(simulation.contacts)))
         if paused or (now >= self._next_markers and self._markers.get_subscription_count()):
             self._next_markers = now + MARKER_PERIOD
             self._publish_markers(simulation, stamp)
+        self._pending = []
+        for publisher, publish in ((self._measures, self._publish_measures),
+                                   (self._swings, self._publish_swings),
+                                   (self._poses, self._publish_poses)):
+            if publisher is not None and (paused or publisher.get_subscription_count()):
+                publish(simulation, stamp)
+            elif publisher is not None:
+                self._pending.append(publish)
 
     def publish_on_pause(self, simulation: Simulation, stamp: int) -> None:
         """On pause, publish the pending messages to the latched topics for late subscribers."""
-        if self._poses_pending:
-            self._publish_poses(simulation, stamp)
+        for publish in self._pending:
+            publish(simulation, stamp)
+        self._pending = []
         self._publish_markers(simulation, stamp)
+
+    def _publish_measures(self, simulation: Simulation, stamp: int) -> None:
+        """Publish time, run and energy of the state with this stamp."""
+        last, reset_count, run = self._run
+        if last is not simulation or reset_count != simulation.reset_count:
+            run = time.time_ns()
+            self._run = simulation, simulation.reset_count, run
+        measures = TickMeasures(simulation.time, run, self._urdf, simulation.energy_excess,
+                                *simulation.work)
+        self._measures.publish(serialize_measures(self._node.get_fully_qualified_name(), stamp,
+                                                  measures))
+
+    def _publish_swings(self, simulation: Simulation, stamp: int) -> None:
+        self._swings.publish(self._templates.swings.serialize(stamp, poses_of(simulation.swings)))
 
     def _publish_poses(self, simulation: Simulation, stamp: int) -> None:
         """Publish the PoseArray of all bones on ~/poses; SceneTemplates.poses makes it."""
-        self._poses_pending = False
         self._poses.publish(self._templates.poses.serialize(stamp, poses_of(simulation.state)))
 
     def _publish_markers(self, simulation: Simulation, stamp: int) -> None:
@@ -118,7 +147,7 @@ class Outputs:
     def _set_swings_publisher(self, enabled: bool) -> None:
         """Create or destroy the publisher of ~/swings: a scene without swings has no such topic."""
         if enabled and self._swings is None:
-            self._swings = self._node.create_publisher(PoseArray, '~/swings', 10)
+            self._swings = self._node.create_publisher(PoseArray, '~/swings', LATCHED_HISTORY)
         elif not enabled and self._swings is not None:
             self._node.destroy_publisher(self._swings)
             self._swings = None

@@ -21,7 +21,7 @@ from rclpy.utilities import remove_ros_args
 
 from .process.rclpy_context import rclpy_context
 from .process.signals import run_until_signal
-from .teleop.teleop import HELP, Teleop, show, spin_with_keyboard
+from .teleop.teleop import HELP, Teleop, show_line, spin_with_keyboard
 
 LOG_PERIOD = 1.0
 """s between two log lines without a terminal."""
@@ -150,8 +150,7 @@ def _show_output(process: subprocess.Popen) -> None:
     """Print the new output of a piped process above the status line."""
     output = _output(process)
     for line in ((output and output.read()) or b'').decode('utf-8', 'replace').splitlines():
-        show(line)
-        print()
+        show_line(line)
 
 
 def _output(process: subprocess.Popen) -> IO[bytes] | None:

@@ -61,6 +61,7 @@ class Ticker:
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
         self._pacer, self._running = Pacer(1.0, 0), False
+        self._ticks_per_wake = 1
         self._throttles = {interval: PollThrottle(interval)
                            for interval in (SERVICE_INTERVAL, QOS_EVENT_INTERVAL)}
         self._timer = node.create_timer(1.0, self._on_timer, clock=steady)

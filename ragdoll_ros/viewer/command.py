@@ -172,10 +172,11 @@ def check_options(options: argparse.Namespace, for_ros: list[str]) -> None:
 
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
     """Serve the page until ``stop`` is set; RagdollError."""
-    folder = folder_for_files(options.folder)
     number = free_port(options.host, options.port)
     source = make_source(options, for_ros)
     try:
+        # Last, as it may create a folder.
+        folder = folder_for_files(options.folder)
         Page = page_class()
         with server_at(options.host, number) as server:
             page = Page(server, source, folder)

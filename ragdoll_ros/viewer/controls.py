@@ -52,8 +52,7 @@ class Controls:
         self.engine = gui.add_dropdown('Engine', ENGINES, initial_value=ENGINES[0],
                                        visible=is_simulated,
                                        hint='physics engine; another one restarts the scene')
-        self.real_time_factor.on_update(lambda event: event.client and (
-            self.source.set_real_time_factor(self.real_time_factor.value)))
+        self.real_time_factor.on_update(self._on_real_time_factor)
         self.scene.on_update(self._on_scene)
         self.engine.on_update(self._on_engine)
         for button, label, key, action in (
@@ -105,6 +104,13 @@ class Controls:
         """
         self._shown_scene = shown = name if name in self.scene.options else OTHER
         self._loop.call_soon_threadsafe(setattr, self.scene, 'value', shown)
+
+    def _on_real_time_factor(self, event: viser.GuiEvent) -> None:
+        """Set it; ignore the 0 of 0.5 as it is typed."""
+        lowest, highest = REAL_TIME_FACTORS
+        factor = event.target.value
+        if event.client is not None and lowest <= factor <= highest:
+            self.source.set_real_time_factor(factor)
 
     async def _on_scene(self, event: viser.GuiEvent) -> None:
         """Load the chosen scene, whose name is read before the page can overwrite it."""

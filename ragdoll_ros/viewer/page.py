@@ -63,7 +63,7 @@ class Page:
                      style('disconnected_banner.css', message=DISCONNECTED),
                      script('null_node_guard.js'), script('materials.js'),
                      script('hide_drag_arrow.js'), script('handle_picking.js', ROOT=ROOT),
-                     script('upload_notices.js')):
+                     script('upload_notices.js'), script('decimal_comma.js')):
             server.gui.add_html(html)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
@@ -97,9 +97,12 @@ class Page:
         self.source.request(self.display.requested if is_open else RequestedData())
         self.controls.pushes.update(time.monotonic())
         if is_open:
-            frame, status = self.source.frame, self.source.status
-            if frame is not None:
-                self._show(frame, status, time.monotonic())
+            frames, status = self.source.take_frames(), self.source.status
+            now = time.monotonic()
+            for frame in frames:
+                self._keep(frame, status, now)
+            if self._live is not None:
+                self._show(self._live, status, now)
             if self.stage is not None:
                 self.stage.set_visible(bones=self.display.bones.value,
                                        skins=self.display.skin.value)
@@ -112,14 +115,16 @@ class Page:
             self.start_when_visible.update(clients, self.frame is not None, time.monotonic())
         return is_open
 
+    def _keep(self, frame: Frame, status: SourceStatus, now: float) -> None:
+        """Keep a new frame of the source for recordings, timeline and plots."""
+        self._live = frame
+        self._recording.add(frame)
+        self.timeline.add(frame)
+        self.plots.add(frame, self.timeline.live_instant(frame), status, now)
+
     def _show(self, live: Frame, status: SourceStatus, now: float) -> None:
         """Draw the source's newest frame, or the one that the timeline selects."""
-        if live is not self._live:
-            self._live = live
-            self._recording.add(live)
-            self.timeline.add(live)
-        self.plots.add(live, self.timeline.live_instant(live), status, now)
-        self.plots.show(self.timeline.shown_instant(now))
+        self.plots.show(self.timeline.shown_instant(now), now)
         frame = self.timeline.frame_to_show(live, now)
         if frame is not self.frame:
             self._draw(frame)

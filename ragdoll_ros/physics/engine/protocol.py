@@ -230,6 +230,10 @@ class Engine(Protocol):
         losses. Only changes, summed over a cluster, are meaningful: work is that of the cluster.
         """
 
+    @property
+    def work(self) -> tuple[float, float]:
+        """Work of pushes and of hands since the start, J."""
+
     def measures(self) -> dict[str, float]:
         """Error measures and counters since the start; keys end in units."""
 

@@ -1,6 +1,7 @@
 """A status line from the state and diagnostics that a node publishes."""
 from __future__ import annotations
 
+import contextlib
 import math
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -9,6 +10,7 @@ from sensor_msgs.msg import MultiDOFJointState
 
 from ...model.scene import SECOND
 from ..diagnostics import status_name
+from ..messages.measures import deserialize_measures
 
 
 class StatusLine:
@@ -18,9 +20,13 @@ class StatusLine:
         self._status_name = status_name(*name.rsplit('/', 1))
         self._values: dict[str, str] = {}
         self._state: MultiDOFJointState | None = None
+        self._time = 0.0
+        """Simulated time, s."""
         self.subscriptions = [
             node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10),
-            node.create_subscription(MultiDOFJointState, f'{name}/state', self._on_state, 1)]
+            node.create_subscription(MultiDOFJointState, f'{name}/state', self._on_state, 1),
+            node.create_subscription(DiagnosticArray, f'{name}/measures', self._on_measures, 1,
+                                     raw=True)]
 
     @property
     def paused(self) -> bool:
@@ -38,14 +44,8 @@ class StatusLine:
             return 'waiting for the node'
         values = self._values
         factor = 'paused' if self.paused else f'RTF {float(values["pace"]):.2f}'
-        return '  '.join((factor, f'{self._time():.1f} s', f'push {push or values["push"]}',
+        return '  '.join((factor, f'{self._time:.1f} s', f'push {push or values["push"]}',
                           f'tick {float(values["tick_cost_ms"]):.2f} ms', self._root()))
-
-    def _time(self) -> float:
-        """Simulated time, s, from the state's stamp and the stamp of time zero."""
-        stamp, values = self._state.header.stamp, self._values
-        since = stamp.sec * SECOND + stamp.nanosec - int(values['stamp_of_zero'])
-        return since / SECOND * float(values['stamp_pace'])
 
     def _root(self) -> str:
         name, velocity = self._state.joint_names[0], self._state.twist[0].linear
@@ -57,6 +57,10 @@ class StatusLine:
         for status in message.status:
             if status.name == self._status_name:
                 self._values = {pair.key: pair.value for pair in status.values}
+
+    def _on_measures(self, data: bytes) -> None:
+        with contextlib.suppress(ValueError):
+            self._time = deserialize_measures(data)[1].time / SECOND
 
     def _on_state(self, message: MultiDOFJointState) -> None:
         self._state = message

@@ -187,6 +187,12 @@ def show(line: str) -> None:
     sys.stdout.flush()
 
 
+def show_line(line: str) -> None:
+    """Print a whole line above the status line, on as many rows as it takes."""
+    sys.stdout.write(f'\r\x1b[K{line}\n')
+    sys.stdout.flush()
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Steer a running node until q. Returns 2 without a terminal or for an invalid name."""
     arguments = sys.argv if arguments is None else arguments

@@ -12,13 +12,16 @@ from ...physics.rigid_body import JointGap
 from ..sources.source import Frame, SourceStatus
 
 PERIOD = 0.25
-"""s between two points."""
+"""s of wall time between two pictures, and over which the real-time factor is measured."""
 
 SPAN = 20.0
 """s of the timeline that a plot shows."""
 
-MAX_POINTS = 600
-"""Kept: 150 s of wall time, which hold the timeline's 60 s at a real-time factor of 0.4."""
+MAX_POINTS = 30_000
+"""Kept: the timeline's 60 s in ticks of 2 ms."""
+
+COLUMNS = 150
+"""Of a picture: in each, the smallest and the largest value are drawn."""
 
 HEIGHT = 170
 
@@ -36,48 +39,55 @@ class Plots:
         self.gap = _Plot(server, 'Joint gap, µm', (('largest', 'darkorange'),))
         self.real_time_factor = _Plot(server, 'Real-time factor', (
             ('measured', 'seagreen'), ('requested', 'silver')))
-        self._scene: object = None
-        self._next = 0.0
-        self._last = (0.0, 0.0)
-        """Simulated and wall time of the last point, s."""
-        self._instant = 0.0
-        self._measures: object = None
+        self._last: Frame | None = None
+        self._measured = (0.0, 0.0)
+        """Simulated and wall time, s, since which the real-time factor is measured."""
+        self._instant = self._next = 0.0
 
     def add(self, frame: Frame, instant: float, status: SourceStatus, now: float) -> None:
-        """Add points for a frame at an ``instant`` of the timeline, s, once per PERIOD.
+        """Add points for a frame at an ``instant`` of the timeline, s.
 
         ``now`` is s of a steady clock. A reset begins a run; another scene, or a recording from its
         start, begins the timeline and clears the plots.
         """
-        is_new_run = frame.scene is not self._scene or frame.time < self._last[0]
-        if now < self._next and not is_new_run:
-            return
-        if is_new_run:
-            self._begin(frame, instant)
-        elif now - self._last[1] < 2 * PERIOD:
-            measured = (frame.time - self._last[0]) / (now - self._last[1])
-            self.real_time_factor.add(instant, frame.time, measured,
-                                      0.0 if status.paused else status.real_time_factor)
-        self._next, self._last, self._instant = now + PERIOD, (frame.time, now), instant
+        last = self._last
+        if last is None or frame.scene is not last.scene or frame.run != last.run or (
+                frame.time < last.time):
+            self._begin(frame, instant, now)
+        self._last, self._instant = frame, instant
+        self._measure(frame, instant, status, now)
         # Less than a nanometre is rounding, which would fill the plot.
         gap = 1e6 * self._gaps.gaps(frame.state).max(initial=0.0)
         self.gap.add(instant, frame.time, round(float(gap), 3))
-        measures = status.measures
-        if measures and measures is not self._measures:
-            self._measures = measures
-            work = measures['work_of_pushes_J'] + measures.get('work_of_grabs_J', 0.0)
-            self.energy.add(instant, frame.time, work + measures['energy_excess_J'], work)
+        self.energy.add(instant, frame.time, frame.energy, frame.work)
 
-    def show(self, instant: float | None = None) -> None:
-        """Draw the SPAN s before an instant of the timeline; None: before the newest point."""
+    def _measure(self, frame: Frame, instant: float, status: SourceStatus, now: float) -> None:
+        """Measure the real-time factor over a PERIOD; a longer one was a pause or a stall."""
+        simulated, elapsed = frame.time - self._measured[0], now - self._measured[1]
+        if elapsed < PERIOD:
+            return
+        if elapsed < 2 * PERIOD:
+            self.real_time_factor.add(instant, frame.time, simulated / elapsed,
+                                      0.0 if status.paused else status.real_time_factor)
+        self._measured = frame.time, now
+
+    def show(self, instant: float | None, now: float) -> None:
+        """Draw the SPAN s before an instant of the timeline once per PERIOD; None: before the
+        newest point. ``now`` is s of a steady clock.
+        """
+        if now < self._next:
+            return
+        self._next = now + PERIOD
         for plot in (self.energy, self.gap, self.real_time_factor):
             plot.show(instant)
 
-    def _begin(self, frame: Frame, instant: float) -> None:
-        clear = frame.scene is not self._scene or instant < self._instant
-        if frame.scene is not self._scene:
-            self._scene = frame.scene
+    def _begin(self, frame: Frame, instant: float, now: float) -> None:
+        """Begin a run of plots, of another scene if that is another one."""
+        is_new_scene = self._last is None or frame.scene is not self._last.scene
+        clear = is_new_scene or instant < self._instant
+        if is_new_scene:
             self._gaps = JointGap(frame.scene)
+        self._measured = frame.time, now
         for plot in (self.energy, self.gap, self.real_time_factor):
             plot.begin(clear)
 
@@ -121,8 +131,29 @@ class _Plot:
             # Hidden while empty: uPlot, shown without data, has no scale for later data.
             self.handle.visible = bool(rows)
             if rows:
-                self.handle.data = self._data(rows)
+                self.handle.data = self._data(thinned(np.array(rows), COLUMNS))
 
-    def _data(self, rows: Sequence[tuple[float, ...]]) -> tuple[np.ndarray, ...]:
+    def _data(self, rows: Sequence[tuple[float, ...]] | np.ndarray) -> tuple[np.ndarray, ...]:
         table = np.array(rows, float).reshape(-1, self._width)
         return tuple(np.ascontiguousarray(column) for column in table.T)
+
+
+def thinned(rows: np.ndarray, columns: int) -> np.ndarray:
+    """Rows (k, w), of ascending first values, without those that a picture does not show.
+
+    Its width is divided into equal columns. In each remain the rows with the smallest and the
+    largest value of each line, the first row and the last.
+    """
+    if len(rows) <= 2 * columns:
+        return rows
+    begin, end = rows[0, 0], rows[-1, 0]
+    column = np.minimum((rows[:, 0] - begin) / (end - begin) * columns, columns - 1).astype(int)
+    firsts = np.flatnonzero(np.diff(column, prepend=-1))
+    kept = [0, len(rows) - 1]
+    for line in rows[:, 1:].T:
+        for extreme in (np.minimum, np.maximum):
+            value = extreme.reduceat(line, firsts)[np.searchsorted(firsts, np.arange(len(rows)),
+                                                                   'right') - 1]
+            found = np.flatnonzero(line == value)
+            kept += found[np.diff(column[found], prepend=-1) > 0].tolist()
+    return rows[np.unique(kept)]

@@ -1,6 +1,8 @@
 """Skins of fitted characters as skinned meshes, driven by the bones."""
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import viser
 
@@ -16,6 +18,11 @@ MAX_SKINS = 30
 """At once: each sends a message for every bone in each frame."""
 
 
+NAMES = map('/scene/skins/{}'.format, itertools.count())
+"""Of nodes. None is used twice: a page would keep the materials of the skin before, whose groups
+the next one lacks, and draw nothing."""
+
+
 class SkinMeshes:
     """Skins of the first MAX_SKINS dolls of a scene that have one.
 
@@ -27,8 +34,7 @@ class SkinMeshes:
         self.handles: list[viser.MeshSkinnedHandle] = []
         self.skinned: set[int] = set()
         self._bones: list[np.ndarray] = []
-        for number, (placement, part) in enumerate(
-                zip(scene.dolls, scene.bone_slices, strict=True)):
+        for placement, part in zip(scene.dolls, scene.bone_slices, strict=True):
             try:
                 skin = skin_of(placement.doll)
             except errors.RagdollError as error:
@@ -39,7 +45,7 @@ class SkinMeshes:
             if len(self.handles) == MAX_SKINS:
                 self.notes.append(f'skins of {MAX_SKINS} dolls: the others show their bones')
                 break
-            self._add(server, f'/scene/skins/{number}', skin)
+            self._add(server, next(NAMES), skin)
             self._bones.append(part.start + skin.bones)
             self.skinned.update(range(part.start, part.stop))
 

@@ -10,12 +10,17 @@ import viser
 from ...model import errors
 from ...model.scene import Scene
 from ..widgets.error_text import error_text
-from ..widgets.form import GREEN, GREY, RED, colored
+from ..widgets.form import AMBER, GREEN, GREY, RED, colored
 from .scene_folder import CHARACTERS, DOLLS, LARGEST_UPLOAD, SceneFolder
 
 NONE = '(choose one)'
 
 TIME = '%Y-%m-%d %H:%M'
+
+VERDICT_COLORS = {'good': GREEN, 'doubtful': AMBER, 'wrong': RED}
+
+Line = tuple[str, str]
+"""A text and its colour."""
 
 MAX_FINDINGS = 3
 """Findings of each verdict that the page shows."""
@@ -122,16 +127,18 @@ class FilesPanel:
         self.saved.options = (NONE, *entries)
         self.saved.value = NONE
 
-    def _fitted(self, name: str, content: bytes) -> str:
+    def _fitted(self, name: str, content: bytes) -> list[Line]:
         scene, verdicts = self._folder.fit(name, content, self._show_progress)
-        lines = [self._take(scene, 'fit', name)]
+        lines: list[Line] = [(self._take(scene, 'fit', name), GREEN)]
         for placement, verdict in zip(scene.dolls, verdicts, strict=True):
             whose = f'{placement.name}: ' if len(verdicts) > 1 else ''
-            lines.append(f'{whose}verdict: {verdict.word}')
-            lines += [finding.sentence for finding in verdict.findings[:MAX_FINDINGS]]
+            lines.append((f'{whose}verdict: {verdict.word}', VERDICT_COLORS[verdict.word]))
+            lines += [(finding.sentence, VERDICT_COLORS[finding.word])
+                      for finding in verdict.findings[:MAX_FINDINGS]]
             if len(verdict.findings) > MAX_FINDINGS:
-                lines.append(f'{len(verdict.findings) - MAX_FINDINGS} more, listed by ragdoll_fit')
-        return '; '.join(lines)
+                lines.append((f'{len(verdict.findings) - MAX_FINDINGS} more, listed by '
+                              'ragdoll_fit', GREY))
+        return lines
 
     def _take(self, scene: Scene, action: str, name: str) -> str:
         self._set_scene(scene, f'{action} {name}')
@@ -142,17 +149,21 @@ class FilesPanel:
         self.progress.value = 100 * fraction
         self._show(step + ' ...', GREEN)
 
-    def _try(self, action: Callable[[], str]) -> None:
+    def _try(self, action: Callable[[], str | list[Line]]) -> None:
         """Run an action and show its message, or its error."""
         try:
-            self._show(action(), GREEN)
+            said = action()
+            self._show_lines([(said, GREEN)] if isinstance(said, str) else said)
         except errors.RagdollError as error:
             self._show(error_text(error), RED)
         except OSError as error:
             self._show(f'{error.filename or "file"}: {error.strerror or error}', RED)
 
     def _show(self, text: str, color: str) -> None:
-        self.message.content = colored(text, color)
+        self._show_lines([(text, color)])
+
+    def _show_lines(self, lines: list[Line]) -> None:
+        self.message.content = ''.join(colored(text, color) for text, color in lines)
 
     def _on_upload(self, button: viser.GuiUploadButtonHandle,
                    action: Callable[[str, bytes], None]) -> None:

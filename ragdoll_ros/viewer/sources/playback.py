@@ -31,6 +31,7 @@ class PlaybackSource(Source):
         """s of the recording at the wall time _since."""
         self._since = time.monotonic()
         self._frame = self.frame_at(0.0)
+        self._taken: Frame | None = None
 
     @property
     def recording(self) -> Recording:
@@ -43,6 +44,11 @@ class PlaybackSource(Source):
             if instant != self._frame.time:
                 self._frame = self.frame_at(instant)
             return self._frame
+
+    def take_frames(self) -> list[Frame]:
+        last, frame = self._taken, self.frame
+        self._taken = frame
+        return [] if frame is last else [frame]
 
     @property
     def status(self) -> SourceStatus:

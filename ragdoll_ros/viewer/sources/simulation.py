@@ -1,6 +1,7 @@
 """A simulation in this process as a source, in a thread of its own that alone uses it."""
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import queue
@@ -34,6 +35,9 @@ MEASURE_SHARE = 0.05
 ACCURACY = 'normal'
 """At the start."""
 
+MAX_NEW_FRAMES = 300
+"""That are kept for the page: 3 s of ticks, in which it may draw nothing."""
+
 JOIN_TIMEOUT = 1.0
 """s that the thread may take to end."""
 
@@ -48,6 +52,9 @@ class SimulationSource(Source):
         self._commands: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._requested = RequestedData()
         self._frame: Frame | None = None
+        self._new_frames: deque[Frame] = deque(maxlen=MAX_NEW_FRAMES)
+        self._runs = 0
+        """Number of runs of the simulations before this one."""
         self._statistics = TickStatistics()
         self._simulation = Simulation(scene, engine=engine, workers='auto')
         self._status = SourceStatus(
@@ -63,6 +70,9 @@ class SimulationSource(Source):
     @property
     def frame(self) -> Frame | None:
         return self._frame
+
+    def take_frames(self) -> list[Frame]:
+        return [self._new_frames.popleft() for _ in range(len(self._new_frames))]
 
     @property
     def status(self) -> SourceStatus:
@@ -102,11 +112,12 @@ class SimulationSource(Source):
         self._run_and_wait(lambda: self._replace(scene, self._status.engine))
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        self._commands.put(lambda: self._simulation.grab(hand, bone, point, target))
+        self._commands.put(lambda: self._move_hand(
+            lambda: self._simulation.grab(hand, bone, point, target)))
 
     def drag(self, hand: str, target: Vector) -> None:
-        self._commands.put(lambda: self._simulation.drag(
-            hand, target, DRAG_TIME * self._status.real_time_factor))
+        self._commands.put(lambda: self._move_hand(lambda: self._simulation.drag(
+            hand, target, DRAG_TIME * self._status.real_time_factor)))
 
     def let_go(self, hand: str) -> None:
         self._commands.put(lambda: self._simulation.let_go(hand))
@@ -172,6 +183,12 @@ class SimulationSource(Source):
         bone = scene.qualified(doll, doll.doll.root.name)
         self._simulation.push(Push(bone, force, duration=duration), 'page')
 
+    @staticmethod
+    def _move_hand(move: Callable[[], None]) -> None:
+        """Move a hand, unless the pointer points nowhere, or the bone is not there any more."""
+        with contextlib.suppress(errors.RagdollError):
+            move()
+
     def _set_accuracy(self, name: str) -> None:
         self._simulation.accuracy = name
         self._update_status(accuracy=name)
@@ -185,6 +202,7 @@ class SimulationSource(Source):
                                 workers='auto')
         factor = (self._status.real_time_factor if scene is self._simulation.scene
                   else _real_time_factor(scene))
+        self._runs += self._simulation.reset_count
         self._simulation.close()
         self._simulation = simulation
         # The measures of the last simulation do not hold for this one.
@@ -211,13 +229,17 @@ class SimulationSource(Source):
         simulation, requested = self._simulation, self._requested
         swings = simulation.swings
         contacts = simulation.contacts if requested.contacts else None
+        work = sum(simulation.work)
         self._frame = Frame(
             simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,
             grabs=tuple(self._grabs()),
             rods=None if swings is None else swings.rods,
             contacts=None if contacts is None else contacts.positions,
             angles=simulation.joint_angles if requested.angles else None,
-            forces=None if contacts is None else contacts.normals * contacts.forces[:, None])
+            forces=None if contacts is None else contacts.normals * contacts.forces[:, None],
+            run=self._runs + simulation.reset_count, energy=work + simulation.energy_excess,
+            work=work)
+        self._new_frames.append(self._frame)
         if time.monotonic() >= self._next_status:
             self._next_status = time.monotonic() + STATUS_PERIOD
             self._status = dataclasses.replace(

@@ -6,6 +6,7 @@ Commands of the page are queued and do not block, unless a method says that it w
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -37,7 +38,7 @@ class Frame:
     scene: Scene
     """Compared by identity: another scene is another object."""
     time: float
-    """s simulated since the start."""
+    """s simulated since the start of the run."""
     state: State
     """Velocities are NaN where the source has poses only."""
     pushes: tuple[Push, ...] = ()
@@ -50,6 +51,12 @@ class Frame:
     """(k,) rad: joint angles, in the order of Scene.angle_names."""
     forces: np.ndarray | None = None
     """(c, 3) N: normal force at each contact; a node does not publish them."""
+    run: int = 0
+    """Number of the run: another one after each reset and restart."""
+    energy: float = math.nan
+    """Energy of all dolls since the start, J; NaN: unknown."""
+    work: float = math.nan
+    """Work of pushes and hands since the start, J; NaN: unknown."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,8 @@ class SourceStatus:
 
     problem: str = ''
     """What is wrong, as text for the page; empty if nothing is."""
+    silent: bool = False
+    """Whether it is a node of which no messages come."""
     note: str = ''
     """Information on what is shown; may be empty."""
     paused: bool = False
@@ -93,6 +102,9 @@ class Source(Protocol):
     @property
     def frame(self) -> Frame | None:
         """The newest frame, a new object for each instant; None before the first."""
+
+    def take_frames(self) -> Sequence[Frame]:
+        """All frames since the last call, oldest first; some are lost after a long time."""
 
     @property
     def recording(self) -> Recording | None:
@@ -137,7 +149,9 @@ class Source(Protocol):
         """Restart with a scene; waits; RagdollError with the reason if refused."""
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Hold a bone at ``point``, m, bone frame, and pull that to ``target``, m, world frame."""
+        """Hold a bone at ``point``, m, bone frame, and pull that to ``target``, m, world frame.
+        A point that is nowhere is ignored, as it is by `drag`.
+        """
 
     def drag(self, hand: str, target: Vector) -> None:
         """Move the target of a hand, m, world frame."""

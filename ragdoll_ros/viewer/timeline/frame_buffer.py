@@ -14,11 +14,11 @@ from ..sources.source import Frame
 SPAN = 60.0
 """s of simulated time that are kept."""
 
-MAX_FRAMES = 6000
-"""SPAN at the page's 60 Hz down to a real-time factor of 0.6."""
+MAX_FRAMES = 30_000
+"""SPAN in ticks of 2 ms."""
 
 MAX_NUMBERS = 5_000_000
-"""40 MB: 60 s at 60 Hz of six dolls of ten bones; less time of more dolls."""
+"""40 MB: SPAN in ticks of 10 ms of six dolls of ten bones; less time of more dolls."""
 
 TOUCH = 1e-3
 """m above the ground at which a bone counts as touching it, also while it bounces."""
@@ -100,10 +100,11 @@ class FrameBuffer:
         time, was_touching, resets = 0.0, False, False
         if last is None:
             self._heights, self._last_contact_test = GroundHeights(frame.scene), -np.inf
-        elif frame.time == last.frame.time:
+        elif (frame.run, frame.time) == (last.frame.run, last.frame.time):
             return None
         else:
-            was_touching, resets = last.touching, frame.time < last.frame.time
+            was_touching = last.touching
+            resets = frame.run != last.frame.run or frame.time < last.frame.time
             # A tick with a reset has no known length: it counts as long as the one before.
             time = last.time + (self._last_step() if resets else frame.time - last.frame.time)
         entry = TimelineFrame(time, frame, bool(frame.pushes or frame.grabs),

@@ -32,6 +32,9 @@ _UNIT_SPACES = {
     for unit, powers in UNITS.items()}
 """Matches spaces between a number and its unit."""
 
+ROUNDING = 1e-15
+"""Largest number that is shown as 0: the sine of half a turn is 1.2e-16 in floating point."""
+
 EXPECTED_COLOR = 'a known colour, such as red, #1e90ff or 30 144 255'
 
 _THREE = re.compile(r'\s*rgb\s*\(([^()]*)\)\s*|([^a-z#]*)', re.IGNORECASE)
@@ -116,7 +119,8 @@ def parse_color(event: str) -> tuple[int, int, int]:
 
 
 def format_number(value: float) -> str:
-    """A number with seven digits, so a length in m to 0.1 um."""
+    """A number with seven digits, so a length in m to 0.1 um; 0 for what is only rounding."""
+    value = 0.0 if abs(value) < ROUNDING else value
     text = f'{value + 0.0:.7g}'
     mantissa, e, power = text.partition('e')
     return f'{mantissa}e{int(power)}' if e else text

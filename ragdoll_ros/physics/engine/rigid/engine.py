@@ -156,6 +156,11 @@ class RigidEngine:
     def energy_excesses(self) -> np.ndarray:
         return self._doll_totals.energy - self._start_energies - self._clusters.work()
 
+    @property
+    def work(self) -> tuple[float, float]:
+        stats = self._clusters.stats
+        return float(stats['work_pushes'].sum()), float(stats['work_grabs'].sum())
+
     def measures(self) -> dict[str, float]:
         stats = self._clusters.totals()
         return {

@@ -139,6 +139,10 @@ class SubsteppedEngine(ABC):
         excesses[0] = self._account.excess(self.doll_totals.energy)
         return excesses
 
+    @property
+    def work(self) -> tuple[float, float]:
+        return self._account.pushes, self._account.grabs
+
     def measures(self) -> dict[str, float]:
         """Measures of the energy account, and the substeps of the last advance()."""
         return {**self._account.measures(self.doll_totals.energy), 'substeps': self._taken}

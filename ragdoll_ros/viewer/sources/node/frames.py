@@ -4,142 +4,231 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 
 from ....model.scene import SECOND, Scene
 from ....model.state import State
 from ....recordings.recording import Rods
+from ....ros.messages.measures import TickMeasures, deserialize_measures
 from ....ros.messages.serialized import deserialize_pose_array
-from ....ros.outputs import LATCHED
 from ..source import Frame, RequestedData
 from .hands import NodeHands
 from .pushes import ObservedPushes
 
+MAX_MESSAGES = 300
+"""Messages of a topic that wait to be read: 3 s of ticks, in which a page may draw nothing."""
+
+QOS = QoSProfile(depth=MAX_MESSAGES)
+LATCHED_QOS = QoSProfile(depth=MAX_MESSAGES, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
 
 class Topic(NamedTuple):
-    """A topic of each tick; ``read`` raises ValueError for a malformed message."""
+    """A topic of each tick.
+
+    ``read`` gives stamp, ns, and content of a message; it raises ValueError for a malformed one.
+    """
 
     message: type
     name: str
-    read: Callable[[object, Scene | None], object]
-    qos: QoSProfile | int = 1
+    read: Callable[[object, Scene | None], tuple[int, object]]
+    qos: QoSProfile = QOS
     raw: bool = True
 
 
-def _positions(data: bytes, _: Scene | None) -> np.ndarray:
-    return deserialize_pose_array(data)[1][:, :3]
+def _positions(data: bytes, _: Scene | None) -> tuple[int, np.ndarray]:
+    stamp, poses = deserialize_pose_array(data)
+    return stamp, poses[:, :3]
 
 
-def _angles(message: JointState, scene: Scene | None) -> np.ndarray:
+def _angles(message: JointState, scene: Scene | None) -> tuple[int, np.ndarray]:
     if scene is None or tuple(message.name) != scene.angle_names:
         raise ValueError('joints of another scene')
-    return np.array(message.position)
+    stamp = message.header.stamp
+    return stamp.sec * SECOND + stamp.nanosec, np.array(message.position)
 
 
 TOPICS = {'poses': Topic(PoseArray, '{}/poses', lambda data, _: deserialize_pose_array(data),
-                         LATCHED),
+                         LATCHED_QOS),
+          'measures': Topic(DiagnosticArray, '{}/measures',
+                            lambda data, _: deserialize_measures(data), LATCHED_QOS),
           'contacts': Topic(PoseArray, '{}/contacts', _positions),
-          'swings': Topic(PoseArray, '{}/swings', _positions),
+          'swings': Topic(PoseArray, '{}/swings', _positions, LATCHED_QOS),
           'angles': Topic(JointState, 'joint_states', _angles, raw=False)}
-"""By content; {} stands for the node's name."""
+"""By content; {} stands for the node's name. The node publishes poses last."""
 
 
 class NodeFrames:
-    """Combines the latest messages of all subscribed topics into a frame of the current scene."""
+    """Combines messages of one stamp, of all subscribed topics, into frames of the current scene.
+
+    Poses wait for the measures of their tick, which tell the simulated time and the scene, and for
+    that scene. Of the other topics the newest message is used if that of the tick is missing.
+    """
 
     def __init__(self, node: Node, name: str, hands: NodeHands) -> None:
         self._node, self._name, self._hands = node, name, hands
         self._lock = threading.Lock()
-        self._topics: dict[str, _NewestMessage] = {}
-        self._values: dict[str, object] = {}
+        self._topics: dict[str, _NewMessages] = {}
+        self._poses: deque[tuple[int, np.ndarray]] = deque(maxlen=MAX_MESSAGES)
+        """Stamps and poses that wait for their measures."""
+        self._values: dict[str, dict[int, object]] = {}
+        """Of the other topics, the content of messages by their stamps."""
+        self._latest: dict[str, object] = {}
+        """Of each topic, the content that was used last."""
         self._pushes: ObservedPushes | None = None
         self._rods: Rods | None = None
+        self._urdf = ''
+        """Checksum of the scene's URDF."""
+        self._frames: deque[Frame] = deque(maxlen=MAX_MESSAGES)
+        """Not taken yet."""
         self._frame: Frame | None = None
-        self._changes = 0
-        """Count of messages, scene changes and ended subscriptions."""
-        self._frame_changes = (0, 0)
-        """That count, and that of hand moves, when the frame was made."""
-        self._zero_of_poses: tuple[int, float] | None = None
-        self.zero: tuple[int, float] | None = None
-        """Stamp at simulated time zero, ns, and simulated time per stamp time, as last reported."""
+        self._run_times: dict[int, int] = {}
+        """Latest simulated time, ns, of each of the last runs."""
+        self._last: tuple[TickMeasures, np.ndarray] | None = None
+        """Of the newest frame."""
+        self._is_outdated = False
+        """Whether scene or subscriptions have changed since the newest frame."""
+        self._moves = 0
+        """Count of hand moves at the newest frame."""
         self.last_poses = 0.0
         """When the last poses came, s of the steady clock."""
 
     def subscribe(self, requested: RequestedData) -> None:
         """Subscribe to the topics of the requested data, and to no others."""
         swings = self._rods is not None and self._rods.count > 0
-        needed = {'poses': requested.frames, 'contacts': requested.contacts,
-                  'angles': requested.angles, 'swings': requested.frames and swings}
+        needed = {'poses': requested.frames, 'measures': requested.frames,
+                  'contacts': requested.contacts, 'angles': requested.angles,
+                  'swings': requested.frames and swings}
         kinds = {kind for kind in TOPICS if needed[kind]}
         with self._lock:
             for kind in self._topics.keys() - kinds:
                 self._node.destroy_subscription(self._topics.pop(kind).subscription)
                 self._values.pop(kind, None)
-                self._changes += 1
+                self._latest.pop(kind, None)
+                self._is_outdated = True
+            if not requested.frames:
+                self._poses.clear()
             for kind in kinds - self._topics.keys():
-                topic = TOPICS[kind]
-                self._topics[kind] = _NewestMessage(self._node, topic, self._name)
+                self._topics[kind] = _NewMessages(self._node, TOPICS[kind], self._name)
 
-    def set_scene(self, pushes: ObservedPushes) -> None:
-        """Use the scene of these pushes, from the first poses on that fit it."""
+    def set_scene(self, pushes: ObservedPushes, urdf: str) -> None:
+        """Use the scene of these pushes for the poses of its URDF, of which ``urdf`` is the
+        checksum.
+        """
         with self._lock:
+            self._urdf = urdf
+            if self._pushes is pushes:
+                return
             self._pushes, self._rods = pushes, Rods(pushes.scene)
             for kind in ('swings', 'angles'):
                 self._values.pop(kind, None)
-            self._changes += 1
+                self._latest.pop(kind, None)
+            self._is_outdated = True
 
     @property
     def newest(self) -> Frame | None:
         """Frame of the last poses that fitted the scene; the same object while nothing changes."""
         with self._lock:
-            self._take_messages()
-            changes = self._changes, self._hands.moves
-            is_complete = self._pushes is not None and 'poses' in self._values
-            if is_complete and changes != self._frame_changes:
-                stamp, poses = self._values['poses']
-                if len(poses) == len(self._pushes.scene.bones) and np.isfinite(poses).all():
-                    self._frame_changes, self._frame = changes, self._frame_of(stamp, poses)
+            self._update()
             return self._frame
 
-    def _take_messages(self) -> None:
-        """Read new messages; malformed ones and those of other joints are ignored."""
-        for kind, topic in self._topics.items():
-            message = topic.take()
-            if message is None:
-                continue
-            with contextlib.suppress(ValueError):
-                self._values[kind] = TOPICS[kind].read(message, self._pushes and self._pushes.scene)
-                self._changes += 1
-                if kind == 'poses':
-                    # A report of a later time zero may come before the next poses.
-                    self._zero_of_poses, self.last_poses = self.zero, time.monotonic()
+    def take(self) -> list[Frame]:
+        """All frames since the last call, oldest first."""
+        with self._lock:
+            self._update()
+            frames = list(self._frames)
+            self._frames.clear()
+            return frames
 
-    def _frame_of(self, stamp: int, poses: np.ndarray) -> Frame:
+    def _update(self) -> None:
+        """Read new messages and make frames of them."""
+        scene = self._pushes and self._pushes.scene
+        for kind, topic in self._topics.items():
+            for message in topic.take():
+                # Malformed ones and those of other joints are ignored.
+                with contextlib.suppress(ValueError):
+                    stamp, value = TOPICS[kind].read(message, scene)
+                    self._keep(kind, stamp, value)
+        if self._pushes is None:
+            return
+        for stamp, measures, poses in self._complete_poses():
+            if len(poses) == len(scene.bones) and np.isfinite(poses).all():
+                self._use(stamp)
+                # A late subscription begins with messages that an earlier one may have had.
+                if self._is_new(measures):
+                    self._add_frame(measures, poses)
+        changed = self._is_outdated or self._moves != self._hands.moves
+        if changed and self._last is not None and self._last[0].urdf == self._urdf:
+            self._add_frame(*self._last)
+
+    def _keep(self, kind: str, stamp: int, value: object) -> None:
+        if kind == 'poses':
+            self._poses.append((stamp, value))
+            self.last_poses = time.monotonic()
+            return
+        values = self._values.setdefault(kind, {})
+        values.pop(stamp, None)
+        values[stamp] = value
+        if len(values) > MAX_MESSAGES:
+            values.pop(next(iter(values)))
+        if kind != 'measures' and not self._poses:
+            self._latest[kind], self._is_outdated = value, True
+
+    def _complete_poses(self) -> Iterator[tuple[int, TickMeasures, np.ndarray]]:
+        """Stamp, measures and poses of the scene; those before are of another, or incomplete."""
+        known = {stamp: measures for stamp, measures in self._values.get('measures', {}).items()
+                 if measures.urdf == self._urdf}
+        last = max((k for k, (stamp, _) in enumerate(self._poses) if stamp in known), default=-1)
+        for _ in range(last + 1):
+            stamp, poses = self._poses.popleft()
+            if self._values['measures'].pop(stamp, None) is not None and stamp in known:
+                yield stamp, known[stamp], poses
+
+    def _use(self, stamp: int) -> None:
+        """Make the messages with this stamp, where there are such, the latest ones."""
+        for kind, values in self._values.items():
+            if kind != 'measures' and stamp in values:
+                for old in list(values):
+                    self._latest[kind] = values.pop(old)
+                    if old == stamp:
+                        break
+
+    def _is_new(self, measures: TickMeasures) -> bool:
+        """Whether no frame of this run has been as late; notes it."""
+        before = self._run_times.pop(measures.run, -1)
+        self._run_times[measures.run] = max(before, measures.time)
+        if len(self._run_times) > MAX_MESSAGES:
+            self._run_times.pop(next(iter(self._run_times)))
+        return measures.time > before
+
+    def _add_frame(self, measures: TickMeasures, poses: np.ndarray) -> None:
         scene = self._pushes.scene
+        self._last, self._is_outdated, self._moves = (measures, poses), False, self._hands.moves
         unknown = np.full((len(poses), 3), np.nan)
         state = State(poses[:, :3], poses[:, 3:], unknown, unknown)
-        # Before the first report the node's time zero is unknown.
-        self.zero = (stamp, 1.0) if self.zero is None else self.zero
-        zero, factor = self.zero if self._zero_of_poses is None else self._zero_of_poses
-        self._pushes.time = (stamp - zero) / SECOND * factor
-        masses, rods = self._values.get('swings'), None
+        self._pushes.time = measures.time / SECOND
+        masses, rods = self._latest.get('swings'), None
         if masses is not None and len(masses) == self._rods.count:
             rods = self._rods.ends(masses, state)
-        return Frame(scene, self._pushes.time, state, self._pushes.pushes,
-                     self._hands.grabs(scene, state), rods, self._values.get('contacts'),
-                     self._values.get('angles'))
+        work = measures.work_of_pushes + measures.work_of_grabs
+        self._frame = Frame(scene, self._pushes.time, state, self._pushes.pushes,
+                            self._hands.grabs(scene, state), rods, self._latest.get('contacts'),
+                            self._latest.get('angles'), run=measures.run,
+                            energy=work + measures.energy_excess, work=work)
+        self._frames.append(self._frame)
 
 
-class _NewestMessage:
+class _NewMessages:
     """Subscribes to a topic of the node ``name`` without an executor.
 
     An executor wakes for each message, 100 times a second, and goes through all entities of its
@@ -151,16 +240,20 @@ class _NewestMessage:
             topic.message, topic.name.format(name), lambda _: None, topic.qos,
             callback_group=_NotExecuted(), raw=topic.raw)
 
-    def take(self) -> object | None:
-        """The latest message since the last call, bytes if raw, at a depth of 1; None if none."""
+    def take(self) -> Iterator[object]:
+        """All messages since the last call, bytes if raw."""
         subscription = self.subscription
-        try:
-            with subscription.handle:
-                taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-        except InvalidHandle:
-            # The other thread has destroyed the subscription.
-            return None
-        return None if taken is None else taken[0]
+        for _ in range(MAX_MESSAGES):
+            try:
+                with subscription.handle:
+                    taken = subscription.handle.take_message(subscription.msg_type,
+                                                             subscription.raw)
+            except InvalidHandle:
+                # The other thread has destroyed the subscription.
+                return
+            if taken is None:
+                return
+            yield taken[0]
 
 
 class _NotExecuted(CallbackGroup):

@@ -42,8 +42,10 @@ class NodeHands:
 
     def grab(self, hand: str, bone: str, local: np.ndarray, target: np.ndarray,
              frame: Frame) -> None:
-        """Grab a bone of the shown frame at a point of the bone's frame."""
+        """Grab a bone of the shown frame at a point of the bone's frame, if that is finite."""
         self.let_go(hand)
+        if not (np.isfinite(local).all() and np.isfinite(target).all()):
+            return
         pose = frame.state.poses(frame.scene.bone_index(bone))
         self._hands[hand] = grab = _Hand(bone, local, pose, pose.apply(local))
         self._send(hand, grab, InteractiveMarkerFeedback.MOUSE_DOWN)
@@ -52,7 +54,7 @@ class NodeHands:
     def drag(self, hand: str, target: np.ndarray) -> None:
         """Move the target of a hand that holds something."""
         grab = self._hands.get(hand)
-        if grab is not None:
+        if grab is not None and np.isfinite(target).all():
             grab.target = target
             self._send(hand, grab, InteractiveMarkerFeedback.POSE_UPDATE)
 

@@ -13,6 +13,7 @@ from ....fit.robots.robot import doll_from_urdf
 from ....model import errors
 from ....model.ragdoll import WORLD
 from ....model.scene import Ground, Placement, Scene
+from ....ros.messages.measures import checksum
 from ....ros.parameters.node_settings import BONE_NAMES, SPECS, NodeSettings
 from .services import NodeServices
 
@@ -60,6 +61,11 @@ class NodeScene:
     def forget_description(self) -> None:
         """Wait for another URDF before requesting anything."""
         self._description, self._is_known = None, False
+
+    @property
+    def urdf(self) -> str:
+        """Checksum of the URDF that the node published last."""
+        return checksum(self._description or '')
 
     def take_description(self, message: String) -> None:
         """Callback of `robot_description`."""

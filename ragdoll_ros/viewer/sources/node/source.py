@@ -94,18 +94,22 @@ class NodeSource(Source):
         """Frame of the last messages that fitted the scene."""
         return self._frames.newest
 
+    def take_frames(self) -> list[Frame]:
+        return self._frames.take()
+
     @property
     def status(self) -> SourceStatus:
         """What the node reported last, and whether it is silent."""
         last = self._last_message()
         silence = time.monotonic() - max(last, self._opened)
-        problem = self._scene.problem
+        problem, silent = self._scene.problem, silence > SILENCE
         if last < self._opened:
-            problem = MISSING.format(self._full_name) if silence > 1.0 else ''
-        elif silence > SILENCE:
+            silent = silence > 1.0
+            problem = MISSING.format(self._full_name) if silent else ''
+        elif silent:
             problem = SILENT.format(self._full_name, silence)
         note = ' '.join(filter(None, (self._reported.note, self._scene.note)))
-        return dataclasses.replace(self._reported, problem=problem, note=note,
+        return dataclasses.replace(self._reported, problem=problem, silent=silent, note=note,
                                    engine=self._scene.settings.engine,
                                    accuracy=self._scene.settings.accuracy)
 
@@ -232,11 +236,10 @@ class NodeSource(Source):
                         tick_cost=float(values['tick_cost_ms']) / 1e3,
                         measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):
-                    zero = int(values['stamp_of_zero']), float(values['stamp_pace'])
                     simulated = float(values['simulated_time'])
                     if simulated < self._simulated_time:
                         self._hands.clear()
-                    self._frames.zero, self._simulated_time = zero, simulated
+                    self._simulated_time = simulated
 
     def _keep_in_touch(self) -> None:
         """Timer callback: confirm grabs, and request what is unknown."""
@@ -251,5 +254,5 @@ class NodeSource(Source):
         if self._pushes is None or self._pushes.scene != self._scene.scene:
             self._hands.clear()
             self._pushes = ObservedPushes(self._scene.scene)
-            self._frames.set_scene(self._pushes)
+        self._frames.set_scene(self._pushes, self._scene.urdf)
         self._update_subscriptions()

@@ -1,0 +1,103 @@
+"""~/measures as bytes: simulated time, run and energy of each tick, in a DiagnosticArray.
+
+rclpy takes 0.1 ms to serialize such a message and as long to read it; this takes a tenth of that.
+Little-endian CDR (OMG DDS-XTypes 1.2, 7.4.1): strings have their length before and a zero behind
+them, and begin at multiples of four bytes from the end of the header.
+"""
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ...model.scene import SECOND
+
+CDR_HEADER = b'\0\1\0\0'
+
+TIME, RUN, URDF, EXCESS = 'simulated_time', 'run', 'urdf_crc32', 'energy_excess_J'
+WORK_OF_PUSHES, WORK_OF_GRABS = 'work_of_pushes_J', 'work_of_grabs_J'
+
+
+class TickMeasures(NamedTuple):
+    """What ~/measures holds for the state with the same stamp."""
+
+    time: int
+    """Simulated time since the run's start, ns."""
+    run: int
+    """Number of the run, another one after each reset, change of scene and start of a node."""
+    urdf: str
+    """Checksum of the scene's URDF; see `checksum`."""
+    energy_excess: float
+    """Energy of all dolls, J, minus that at the start and all work."""
+    work_of_pushes: float
+    work_of_grabs: float
+
+
+def checksum(description: str) -> str:
+    """CRC-32 of a URDF as eight hexadecimal digits: tells which scene a message belongs to."""
+    return f'{zlib.crc32(description.encode()):08x}'
+
+
+def serialize_measures(name: str, stamp: int, measures: TickMeasures) -> bytes:
+    """Serialized DiagnosticArray with one status of this ``name``; ``stamp`` in ns."""
+    seconds, rest = divmod(measures.time, SECOND)
+    values = {TIME: f'{seconds}.{rest:09}', RUN: str(measures.run), URDF: measures.urdf,
+              EXCESS: f'{measures.energy_excess:.9g}',
+              WORK_OF_PUSHES: f'{measures.work_of_pushes:.9g}',
+              WORK_OF_GRABS: f'{measures.work_of_grabs:.9g}'}
+    return _array(name, stamp, values)
+
+
+def _array(name: str, stamp: int, values: Mapping[str, str]) -> bytes:
+    data = bytearray(struct.pack('<iI', *divmod(stamp, SECOND)))
+    _add_string(data, '')
+    data += bytes(-len(data) % 4) + struct.pack('<IB', 1, 0)
+    for text in (name, '', ''):
+        _add_string(data, text)
+    data += bytes(-len(data) % 4) + struct.pack('<I', len(values))
+    for pair in values.items():
+        for text in pair:
+            _add_string(data, text)
+    return CDR_HEADER + bytes(data)
+
+
+def _add_string(data: bytearray, text: str) -> None:
+    content = text.encode() + b'\0'
+    data += bytes(-len(data) % 4) + struct.pack('<I', len(content)) + content
+
+
+def deserialize_measures(data: bytes) -> tuple[int, TickMeasures]:
+    """Stamp, ns, and measures of a serialized message of ~/measures; ValueError for other data."""
+    try:
+        if data[:2] != CDR_HEADER[:2]:
+            raise ValueError('not little-endian')
+        seconds, nanoseconds = struct.unpack_from('<iI', data, 4)
+        _, at = _string(data, 12)
+        # The count of statuses, and the level of the first.
+        at += -at % 4 + 5
+        for _ in range(3):
+            _, at = _string(data, at)
+        at += -at % 4
+        count, = struct.unpack_from('<I', data, at)
+        texts, at = [], at + 4
+        for _ in range(2 * min(count, len(data))):
+            text, at = _string(data, at)
+            texts.append(text)
+        values = dict(zip(texts[::2], texts[1::2], strict=True))
+        whole, _, part = values[TIME].partition('.')
+        return seconds * SECOND + nanoseconds, TickMeasures(
+            int(whole) * SECOND + int(part), int(values[RUN]), values[URDF],
+            float(values[EXCESS]), float(values[WORK_OF_PUSHES]), float(values[WORK_OF_GRABS]))
+    except (struct.error, IndexError, KeyError) as error:
+        raise ValueError(str(error)) from None
+
+
+def _string(data: bytes, at: int) -> tuple[str, int]:
+    """The string at the next multiple of four bytes, and where it ends."""
+    at += -at % 4
+    length, = struct.unpack_from('<I', data, at)
+    end = at + 4 + length
+    if not length or end > len(data):
+        raise ValueError('a string does not end in the message')
+    return data[at + 4:end - 1].decode(), end
