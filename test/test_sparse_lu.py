@@ -7,6 +7,7 @@ pytest.importorskip('numba', reason='numba is not installed: there is no rigid e
 import numba
 
 from ragdoll_ros.physics.kernels.maths.anderson import accelerate, make_anderson
+from ragdoll_ros.physics.kernels.maths.minimum_degree import find_order, make_minimum_degree
 from ragdoll_ros.physics.kernels.maths.sparse_lu import (
     clear_row,
     eliminate_row,
@@ -89,6 +90,31 @@ def test_a_matrix_that_would_fill_up_is_refused():
 def test_a_matrix_without_a_pivot_is_refused():
     A = np.array([[0.0, 1.0], [1.0, 0.0]])
     assert solve_sparse(loaded([np.arange(2)], 2), A, np.ones(2), 1) == -2
+
+
+@numba.njit
+def find(nodes, n):
+    find_order(nodes, n)
+
+
+def test_the_order_of_elimination_is_that_of_minimum_degree():
+    """Against the definition: sets of neighbours, by weight, the first of equal ones."""
+    rng = np.random.default_rng(3)
+    n = 40
+    graph = np.triu(rng.random((n, n)) < 0.08, 1)
+    graph |= graph.T
+    weights = rng.integers(1, 7, n)
+    near = {i: set(np.flatnonzero(graph[i])) for i in range(n)}
+    nodes = make_minimum_degree(n)
+    nodes.graph[:], nodes.weight[:] = graph, weights
+    find(nodes, n)
+    for k in nodes.order:
+        least = min(sum(weights[j] for j in own) for own in near.values())
+        assert k == min(i for i, own in near.items() if sum(weights[j] for j in own) == least)
+        own = near.pop(k)
+        for i in own:
+            near[i] = (near[i] | own) - {i, k}
+    assert not near
 
 
 @numba.njit

@@ -10,6 +10,7 @@ from .compiling.bundle import bundle_type
 from .dynamics.forward_dynamics import make_dynamics
 from .dynamics.kinematics import make_kinematics
 from .maths.anderson import make_anderson
+from .maths.minimum_degree import make_minimum_degree
 from .maths.sparse_lu import make_sparse_lu
 from .system import (CONTACT_POINT, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System,
                      blank_system, coordinate_count, tree_depth)
@@ -64,7 +65,8 @@ Island = collections.namedtuple(
     'Island', 'members label Y YT support place W G blocks rhs impulses free_velocity '
     'start_velocity curvature correction soft velocity residual direction best active places '
     'is_normal normal_rhs normal_impulses normal_row z z_direction anderson '
-    'order dof_place A B BY phi local lu occurrence_start occurrences')
+    'bodies body_number elimination dof_place A B BY coupled phi local lu occurrence_start '
+    'occurrences')
 """An island of m contacts (``members``) and their rows, and scratch to solve it.
 
 ``label`` (d,): island of each doll. Rows ``Y`` = J L^-1 have entries for the degrees of freedom
@@ -73,9 +75,10 @@ where a degree of freedom stands in a row. ``W`` = Y Y^T and ``G``, flat (rows *
 island; ``blocks`` (m, 5, 5): diagonal blocks of W of a large one. Of each row: ``rhs`` b of
 u = W p + b; ``impulses`` p; ``free_velocity`` without impulses; ``start_velocity`` at the step's
 start; ``curvature`` bias; ``correction`` impulses; ``soft`` impulses without restitution. The
-others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p; ``order`` (d,) of elimination
-of the dolls, ``dof_place`` (nv,), ``lu`` and ``occurrences``: see sparse_newton.py;
-``anderson``: of sweeps."""
+others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p; of sparse_newton.py:
+``bodies`` (n,) that contacts move, ``body_number`` (n,) of each among them, their order of
+``elimination``, the ``dof_place`` (nv,) that follows, ``lu`` and ``occurrences``; ``anderson``: of
+sweeps."""
 
 Step = collections.namedtuple(
     'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
@@ -148,8 +151,11 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         is_normal=np.zeros(max(rows, 8), np.int64), normal_rhs=each_row(),
         normal_impulses=each_row(), normal_row=np.zeros(max(rows, 8), np.int64),
         z=np.zeros(nv), z_direction=np.zeros(nv), anderson=make_anderson(max(rows, 8), nv),
-        order=np.zeros(len(system.doll_masses), np.int64), dof_place=np.zeros(nv, np.int64),
+        bodies=np.zeros(len(system.tree), np.int64),
+        body_number=np.zeros(len(system.tree), np.int64),
+        elimination=make_minimum_degree(len(system.tree)), dof_place=np.zeros(nv, np.int64),
         A=np.zeros((contacts, 5, 5)), B=np.zeros((contacts, 5, 5)), BY=np.zeros((rows, wide)),
+        coupled=np.zeros(max(rows, 8), np.int64),
         phi=np.zeros((contacts, 5)), local=np.zeros(5), lu=make_sparse_lu(nv, contacts, wide),
         occurrence_start=np.zeros(nv + 1, np.int64),
         occurrences=np.zeros(contacts * wide, np.int64))

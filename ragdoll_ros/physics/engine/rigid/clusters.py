@@ -19,7 +19,7 @@ from ..protocol import GROUND
 from .broad_phase import NO_PAIRS
 from .build_system import build_system, join_systems, pairs_between
 from .doll_states import SNAPSHOT, DollStates, contact_capacity
-from .islands import MOST_BODIES, next_window
+from .islands import LARGE_CLUSTER, next_window
 
 SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'contacts_dropped',
                 'toi_failures', 'restitution_reduced', 'energy_gains', 'work_pushes', 'work_grabs',
@@ -143,7 +143,7 @@ class Clusters:
         jobs, whole = self._jobs, ~sleeping[self._firsts]
         for cluster in self._multi_doll if duration else ():
             place = self.of_doll[cluster.dolls[0]]
-            if whole[place] and len(cluster.system.tree) > MOST_BODIES and (
+            if whole[place] and len(cluster.system.tree) > LARGE_CLUSTER and (
                     self._advance_by_islands(cluster, duration, accuracy)):
                 whole[place] = False
         if not whole.all():

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...kernels.loaded import advance as kernels
 
-MOST_BODIES = 62
-"""Bodies up to which a cluster locates all impacts that are worth it: see MIN_IMPACTS in
-kernels/advance.py."""
+LARGE_CLUSTER, MOST_BODIES = 62, 20
+"""Bodies from beyond which a cluster locates no impacts, see MIN_IMPACTS in kernels/advance.py, and
+up to which an island locates as many as one body."""
 
 MOST_HALVINGS = 6
 """The shortest window is this many times a half of a tick."""

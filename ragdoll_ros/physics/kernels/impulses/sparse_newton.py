@@ -6,9 +6,9 @@ W's diagonal. So dp = -C^-1 (phi + B Y dz) with C = A + B D, a matrix of each co
 
     (I + sum of Y^T C^-1 B Y) dz = -Y^T C^-1 phi.
 
-That matrix has entries between the degrees of freedom of one contact alone. They are eliminated
-from the leaves of each tree to its root, doll by doll in the order of Cuthill and McKee (24th ACM
-National Conference, 1969), so that few more entries arise, in stacks and in heaps of dolls.
+That matrix has entries between the degrees of freedom of one contact alone. They are eliminated body
+by body in the order of minimum degree, so that few more entries arise: from the leaves of each tree
+to its root, and in a stack from both its ends.
 """
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..maths.minimum_degree import find_order
 from ..maths.sparse_lu import clear_row, eliminate_row, find_pattern, substitute_back
 from ..system import NO_SLIP, System
 from ..workspace import Island, Workspace
@@ -34,32 +35,64 @@ first lets the steps cycle; ten times as much takes three times as many."""
 
 @compiled
 def find_sparsity(s: System, ws: Workspace, m: int) -> tuple[int, int]:
-    """Order the degrees of freedom of an island's dolls and find the pattern of the matrix, in
-    island.lu. Returns how many there are, and the work of an elimination, -1 if there is no room.
+    """Order the degrees of freedom of an island and find the pattern of the matrix, in island.lu.
+    Returns how many there are, and the work of an elimination, -1 if there is no room.
     """
-    island, contacts, lu = ws.island, ws.contacts.found, ws.island.lu
-    first = s.body_doll[contacts[island.members[0].contact].body_a]
-    count = order_dolls(s, ws, m, first)
-    count = order_dolls(s, ws, m, island.order[count - 1])
-    place, start, dofs = island.dof_place, island.label, 0
-    for d in range(len(start)):
-        start[d] = 0
-    for j in range(len(place)):
-        start[s.body_doll[s.dof_body[j]]] += 1
+    island, lu, place = ws.island, ws.island.lu, ws.island.dof_place
+    count = connect_bodies(s, ws, m)
+    if count < 0:
+        return 0, -1
+    find_order(island.elimination, count)
+    dofs = 0
     for k in range(count):
-        doll = island.order[k]
-        dofs, start[doll] = dofs + start[doll], dofs
-    for j in range(len(place) - 1, -1, -1):
-        doll = s.body_doll[s.dof_body[j]]
-        place[j] = start[doll]
-        start[doll] += 1
+        node = island.elimination.order[k]
+        first = s.tree[island.bodies[node]].v_start
+        for j in range(first + island.elimination.weight[node] - 1, first - 1, -1):
+            place[j], dofs = dofs, dofs + 1
     for k in range(m):
         i = island.members[k].contact
-        lu.sizes[k] = contacts[i].dof_count
+        lu.sizes[k] = ws.contacts.found[i].dof_count
         for x in range(lu.sizes[k]):
             lu.sets[k, x] = place[island.support[i, x]]
     list_occurrences(island, dofs, m)
     return dofs, find_pattern(lu, dofs, m)
+
+
+@compiled
+def connect_bodies(s: System, ws: Workspace, m: int) -> int:
+    """Write the bodies that m contacts move to island.bodies, as nodes of island.elimination, and
+    connect those that one contact moves. Returns how many there are, or -1 if there is no room.
+    """
+    island, nodes, number = ws.island, ws.island.elimination, ws.island.body_number
+    for i in range(len(number)):
+        number[i] = -1
+    count = 0
+    for k in range(m):
+        i = island.members[k].contact
+        for x in range(ws.contacts.found[i].dof_count):
+            body = s.dof_body[island.support[i, x]]
+            if number[body] < 0:
+                if count == len(nodes.order):
+                    return -1
+                number[body], island.bodies[count], nodes.weight[count] = count, body, 0
+                count += 1
+    for a in range(count):
+        for b in range(count):
+            nodes.graph[a, b] = 0
+    for k in range(m):
+        i, near, before = island.members[k].contact, 0, -1
+        for x in range(ws.contacts.found[i].dof_count):
+            node = number[s.dof_body[island.support[i, x]]]
+            if node == before:
+                continue
+            before = node
+            for a in range(near):
+                nodes.graph[node, nodes.near[a]] = nodes.graph[nodes.near[a], node] = 1
+            nodes.near[near], near = node, near + 1
+    for node in range(count):
+        body = s.tree[island.bodies[node]]
+        nodes.weight[node] = body.dof_count if body.parent >= 0 else 6
+    return count
 
 
 @compiled
@@ -84,30 +117,6 @@ def list_occurrences(island: Island, dofs: int, m: int) -> None:
     for i in range(dofs, 0, -1):
         begin[i] = begin[i - 1]
     begin[0] = 0
-
-
-@compiled
-def order_dolls(s: System, ws: Workspace, m: int, first: int) -> int:
-    """Write the dolls of an island of m contacts to island.order, by their distance from the doll
-    ``first`` along contacts. Returns their number.
-    """
-    order, seen, contacts = ws.island.order, ws.island.label, ws.contacts.found
-    for d in range(len(seen)):
-        seen[d] = 0
-    order[0], seen[first], count, done = first, 1, 1, 0
-    while done < count:
-        doll = order[done]
-        done += 1
-        for k in range(m):
-            c = contacts[ws.island.members[k].contact]
-            if c.body_b < 0:
-                continue
-            a, b = s.body_doll[c.body_a], s.body_doll[c.body_b]
-            other = b if a == doll else a
-            if (a == doll or b == doll) and not seen[other]:
-                order[count], seen[other] = other, 1
-                count += 1
-    return count
 
 
 @compiled
@@ -209,15 +218,19 @@ def eliminate_contact(island: Island, k: int) -> None:
 
 @compiled
 def multiply_rows(island: Island, k: int) -> None:
-    """Write B Y of member k, after eliminate_contact(), to its rows of island.BY."""
+    """Write B Y of member k, after eliminate_contact(), to its rows of island.BY, and whether they
+    are not zero, as those of open contacts are, to island.coupled.
+    """
     member, B, Y, BY = island.members[k], island.B[k], island.Y, island.BY
     for e in range(member.kind):
         row = member.row + e
+        island.coupled[row] = 0
         for x in range(island.lu.sizes[k]):
             BY[row, x] = 0.0
         for g in range(member.kind):
             share, other = B[e, g], member.row + g
             if share != 0.0:
+                island.coupled[row] = 1
                 for x in range(island.lu.sizes[k]):
                     BY[row, x] += share * Y[other, x]
 
@@ -239,6 +252,7 @@ def solve_for_z(island: Island, dofs: int) -> bool:
                 entry = Y[member.row + e, x]
                 if entry != 0.0:
                     dz[i] -= entry * phi[e]
+                if entry != 0.0 and island.coupled[member.row + e]:
                     for y in range(lu.sizes[k]):
                         lu.row[lu.sets[k, y]] += entry * BY[member.row + e, y]
         if not eliminate_row(lu, i, dz):

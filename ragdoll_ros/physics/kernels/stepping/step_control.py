@@ -7,7 +7,9 @@ import numpy as np
 
 from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
-from ..contact.gaps import BEYOND_LIMIT, TOUCHING, is_joint_limit_gap
+from ..contact.gaps import (BEYOND_LIMIT, TOUCHING, is_joint_limit_gap,
+                            update_kinematics_and_gaps)
+from ..dynamics.kinematics import integrate_positions
 from ..system import System
 from ..workspace import Workspace
 from .contact_step import MAX_PENETRATION, STEP_TOLERANCE, contact_step, finish_step
@@ -44,8 +46,9 @@ SAFETY = 0.9
 COARSEST = 0.03
 
 SPECULATIVE = 1e-4
-"""m or rad: where times of impact are not sought, gaps that are narrower as a step begins are
-contacts of it from its first trial on. Those that do not close in it have no effect."""
+"""m or rad: where times of impact are not sought, gaps that are narrower as a step begins, as well
+as those that would close at its velocities, are contacts of it from its first trial on. Those that
+do not close in it have no effect."""
 
 
 @compiled
@@ -67,7 +70,7 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
     if seek:
         length = step_to_joint_limit(s, ws, cluster.v, length)
     step.scalars[0].seeks_impacts = 1 if seek else 0
-    begin_trials(ws)
+    length = begin_trials(s, ws, cluster, length, nominal)
     held, moving = total_energy(step.sums_before)
     pushes, grabs, corrections = (stats.work_pushes, stats.work_grabs,
                                   stats.work_position_correction)
@@ -84,9 +87,8 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         if turn < MAX_TRIES - 1 and length > FINEST * nominal and (
                 not gained - step.scalars[0].correction_energy <= tolerated
                 or penetrates_further(s, ws)):
-            length, hit = length / 2, False
+            length, hit = begin_trials(s, ws, cluster, length / 2, nominal), False
             stats.next_dt = length
-            begin_trials(ws)
             clear_contact_accelerations(cluster)
             continue
         shorter = 1.0
@@ -94,8 +96,8 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             shorter = unseen_share(s, ws, UNSEEN_SPEED * nominal)
         if shorter < 1:
             length = max(shorter * length, COARSEST * nominal)
+            length = begin_trials(s, ws, cluster, length, nominal)
             stats.next_dt = length
-            begin_trials(ws)
             clear_contact_accelerations(cluster)
             continue
         if not seek and turn < MAX_TRIES - 1 and activate_contacts(s, ws, length):
@@ -118,16 +120,35 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
 
 
 @compiled
-def begin_trials(ws: Workspace) -> None:
-    """Copy ws.gaps to contacts.gaps_active, where impacts are not sought with the SPECULATIVE ones
-    as touching, and open the bracket of the time of impact.
+def begin_trials(s: System, ws: Workspace, cluster: ClusterState, h: float,
+                 nominal: float) -> float:
+    """Copy ws.gaps to contacts.gaps_active and open the bracket of the time of impact. Returns the
+    length of the first trial, at most h s; see predict_contacts().
     """
-    active, seeks = ws.contacts.gaps_active, ws.step.scalars[0].seeks_impacts
-    for j in range(len(active)):
-        active[j] = ws.gaps[j]
-        if not seeks and active[j] < SPECULATIVE:
-            active[j] = min(active[j], TOUCHING)
+    copy_into(ws.contacts.gaps_active, ws.gaps)
     open_bracket(ws)
+    if ws.step.scalars[0].seeks_impacts:
+        return h
+    share = predict_contacts(s, ws, cluster, h, nominal)
+    if share < 1 and h > COARSEST * nominal:
+        h = max(share * h, COARSEST * nominal)
+        predict_contacts(s, ws, cluster, h, nominal)
+    for j in range(len(ws.gaps)):
+        if ws.contacts.gaps_end[j] < 0 or ws.gaps[j] < SPECULATIVE:
+            ws.contacts.gaps_active[j] = min(TOUCHING, ws.gaps[j], ws.contacts.gaps_end[j])
+    return h
+
+
+@compiled
+def predict_contacts(s: System, ws: Workspace, cluster: ClusterState, h: float,
+                     nominal: float) -> float:
+    """Write the gaps after h s at the velocities of the start to contacts.gaps_end. Returns the
+    share of h after which none is too deep, by unseen_share().
+    """
+    step, q, v = ws.step, cluster.q, cluster.v
+    integrate_positions(s.tree, q, v, h, step.q_end)
+    update_kinematics_and_gaps(s, ws, step.end, step.q_end, v, ws.gaps, h, ws.contacts.gaps_end)
+    return unseen_share(s, ws, UNSEEN_SPEED * nominal)
 
 
 @compiled
