@@ -6,9 +6,9 @@ W's diagonal. So dp = -C^-1 (phi + B Y dz) with C = A + B D, a matrix of each co
 
     (I + sum of Y^T C^-1 B Y) dz = -Y^T C^-1 phi.
 
-That matrix has entries between the degrees of freedom of one contact alone. They are eliminated body
-by body in the order of minimum degree, so that few more entries arise: from the leaves of each tree
-to its root, and in a stack from both its ends.
+That matrix has entries between the degrees of freedom of one contact alone. They are eliminated
+body by body in the order of minimum degree, so that few more entries arise: from the leaves of each
+tree to its root, and in a stack from both its ends.
 """
 from __future__ import annotations
 
