@@ -10,7 +10,7 @@ import viser
 from ..files.config import scene_names
 from ..model.errors import RagdollError
 from ..physics.engine.registry import ENGINES
-from .push_keys import PushKeys
+from .pushing.push_keys import PushKeys
 from .sources.source import Frame, Source, SourceStatus
 
 REAL_TIME_FACTORS = (0.05, 2.0)
