@@ -100,6 +100,14 @@ def test_follow_comes_on_when_the_doll_leaves_and_goes_with_a_reset():
         wait(lambda: not page.display.follow.value)
 
 
+def test_a_fall_alone_does_not_switch_follow_on():
+    """In the home view, which has the place where it will lie."""
+    with served(SimulationSource(load_scene('drop'))) as page:
+        page.open()
+        wait(lambda: page.frame and page.frame.time > 1.5)
+        assert not page.display.follow.value
+
+
 def test_what_is_pushed_is_chosen_by_a_click(page):
     from viser import _messages
     client = page.open()

@@ -100,9 +100,11 @@ class Page:
         is_open = bool(clients)
         self.source.request(self.display.requested if is_open else RequestedData())
         self.controls.pushes.update(time.monotonic())
+        frame = self.source.frame if is_open else None
         if is_open:
-            frame, status = self.source.frame, self.source.status
-            if frame is not None:
+            status = self.source.status
+            start = self.start_when_visible
+            if frame is not None and not (start is not None and start.hides(frame)):
                 self._show(frame, status, time.monotonic())
             if self.stage is not None:
                 self.stage.set_visible(bones=self.display.bones.value,
@@ -113,7 +115,7 @@ class Page:
             self._show_messages(status.problem, status.note)
             self.controls.show(status)
         if self.start_when_visible is not None:
-            self.start_when_visible.update(clients, self.frame is not None, time.monotonic())
+            self.start_when_visible.update(clients, frame, time.monotonic())
         return is_open
 
     def _show(self, live: Frame, status: SourceStatus, now: float) -> None:

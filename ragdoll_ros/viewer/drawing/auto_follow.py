@@ -8,7 +8,10 @@ from ..sources.source import Frame
 from .framing import sees_all
 
 LOOK_AHEAD = 0.3
-"""s that the doll's motion is extrapolated: as long as the camera takes to follow."""
+"""s that the doll's horizontal motion is extrapolated: as long as the camera takes to follow. What
+falls stays in the view, which has the ground below it."""
+
+AHEAD = LOOK_AHEAD * np.array((1.0, 1.0, 0.0))
 
 RADIUS = 0.3
 """m around the centre of mass that has to be in view."""
@@ -40,7 +43,7 @@ class AutoFollow:
         self._time = frame.time
         if self._checkbox.value or frame.grabs:
             self._seen = {}
-        elif self._leaves(clients, np.stack([center, center + LOOK_AHEAD * velocity])):
+        elif self._leaves(clients, np.stack([center, center + AHEAD * velocity])):
             self._checkbox.value = self._is_own = True
 
     def _leaves(self, clients: dict[int, viser.ClientHandle], places: np.ndarray) -> bool:
