@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from page_client import wait
+from page_client import served, wait
 
 from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.viewer.controls import FIRST_SCENES
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 from ragdoll_ros.viewer.sources.source import RequestedData
 from ragdoll_ros.viewer.start_when_visible import StartWhenVisible
@@ -36,6 +37,12 @@ def source():
     wait(lambda: source.status.paused)
     yield source
     source.close()
+
+
+@pytest.fixture(scope='module')
+def page():
+    with served(SimulationSource(load_scene('flight'))) as page:
+        yield page
 
 
 def is_at_start(frame):
@@ -73,3 +80,11 @@ def test_a_run_that_nobody_saw_begins_again_and_is_not_shown_before(source):
     start.update([client, Client()], source.frame, 101.0)
     assert not start.hides(source.frame)
     wait(lambda: source.frame.time > since + 0.2)
+
+
+@pytest.mark.parametrize(('label', 'name'), FIRST_SCENES.items())
+def test_scenes_to_begin_with_are_one_click_away(page, label, name):
+    client = page.clients[0] if page.clients else page.open()
+    wait(lambda: page.frame)
+    client.update(page.controls.first_scenes, label)
+    wait(lambda: page.frame.scene.name == name and page.controls.scene.value == name)
