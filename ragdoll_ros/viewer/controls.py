@@ -16,7 +16,7 @@ from .sources.source import Frame, Source, SourceStatus
 REAL_TIME_FACTORS = (0.05, 2.0)
 """Smallest and largest of the slider."""
 
-FIRST_SCENES = {'Doll': 'drop', 'Person': 'man_faints', 'Ponytail': 'ponytail', 'Crowd': 'crowd'}
+FIRST_SCENES = {'Doll': 'drop', 'Person': 'man_faints', 'Hair': 'ponytail', 'Crowd': 'crowd'}
 """Scenes to begin with, one click away, by the labels of their buttons."""
 
 OTHER = '(other)'
