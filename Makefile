@@ -1,6 +1,7 @@
 # Wants GNU make and a python3 of 3.10 or newer with its venv module; sets up the rest in .venv,
 # with ROS 2 Jazzy from PyPI's wheels, or with the ROS that the shell has sourced.
 PYTHON ?= python3
+RUN_EXTRAS := viewer
 EXTRAS := test,report,fit,viewer,replay,falls
 VENV := .venv
 BIN := $(VENV)/bin
@@ -15,6 +16,8 @@ VERSION := $(shell $(PYTHON) -c 'import sys; v = sys.version_info; \
 ROS := $(or $(ROS_DISTRO),wheels)
 READY := $(VENV)/ready-$(VERSION)-$(ROS)
 COMPILED := $(VENV)/compiled-$(VERSION)-$(ROS)
+# What `make run` needs is there first; the rest, more than as much again, when a target needs it.
+COMPLETE := $(VENV)/complete-$(VERSION)-$(ROS)
 
 ifeq ($(ROS),wheels)
 ROS_EXTRA := ,ros
@@ -30,7 +33,7 @@ run: $(COMPILED) ## start node and page; arrow keys push; SCENE=crowd for anothe
 	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
-test: $(COMPILED) chromium ## all tests except the slow ones
+test: $(COMPLETE) $(COMPILED) chromium ## all tests except the slow ones
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # For the tests of the page: of Playwright only the driver comes from PyPI. Where there is none to
@@ -44,20 +47,20 @@ chromium:
 	  { $(AS_ROOT) apt-get update && $(AS_ROOT) apt-get install --yes --no-install-recommends \
 	  chromium; } >/dev/null 2>&1 || echo 'That needs root and Debian: apt-get install chromium' >&2; }
 
-pictures: $(COMPILED) chromium ## draw the pictures of the page, into docs/
+pictures: $(COMPLETE) $(COMPILED) chromium ## draw the pictures of the page, into docs/
 	@$(BIN)/python docs/viewer.py docs
 
-lint: $(READY) ## ruff, and mypy on the public names
+lint: $(COMPLETE) ## ruff, and mypy on the public names
 	@$(BIN)/python -m ruff check .
 	@$(BIN)/python -m mypy
 
-slow: $(COMPILED) ## the slow tests: those that take minutes or measure time
+slow: $(COMPLETE) $(COMPILED) ## the slow tests: those that take minutes or measure time
 	@$(BIN)/python -m pytest -m slow
 
 soak: $(COMPILED) ## 864 000 ticks with pushes, resets, changes of scene: nothing may grow; 25 min
 	@$(BIN)/python -m ragdoll_ros.ros.tools.soak
 
-bench: $(COMPILED) ## cost of ticks and their parts, crowds, swings, people and the page; 30 min
+bench: $(COMPLETE) $(COMPILED) ## cost of ticks and their parts, crowds, swings, people and the page; 30 min
 	@$(BIN)/python -m ragdoll_ros.ros.tools.bench
 	@$(BIN)/python -m ragdoll_ros.ros.tools.crowd_bench
 	@$(BIN)/python -m ragdoll_ros.accuracy.crowds
@@ -65,10 +68,10 @@ bench: $(COMPILED) ## cost of ticks and their parts, crowds, swings, people and 
 	@$(BIN)/python test/fit_cost.py
 	@$(BIN)/python test/page_cost.py
 
-report: $(COMPILED) ## accuracy report against independent references, into docs/; 60 min
+report: $(COMPLETE) $(COMPILED) ## accuracy report against independent references, into docs/; 60 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.report.command --out docs
 
-hard: $(COMPILED) ## hard cases, each with its rule, as a table
+hard: $(COMPLETE) $(COMPILED) ## hard cases, each with its rule, as a table
 	@$(BIN)/python -m ragdoll_ros.accuracy.report.hard
 
 WORKSPACE := build/colcon
@@ -112,6 +115,12 @@ $(READY): setup.py pyproject.toml
 	@# A sourced rclpy is built against the numpy beside it: that one stays.
 	@$(if $(VENV_FLAGS),$(PIP) freeze,true) | grep '^numpy==' > $(VENV)/keep.txt || true
 	@$(PIP) install --quiet --only-binary :all: pybullet 2>/dev/null || $(MAKE) pybullet-from-source
+	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[$(RUN_EXTRAS)$(ROS_EXTRA)]' \
+	  $(UNWARNED)
+	@touch $@
+
+$(COMPLETE): $(READY)
+	@echo 'Installing what tests, reports and data sets need; once'
 	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[$(EXTRAS)$(ROS_EXTRA)]' \
 	  $(UNWARNED)
 	@touch $@
@@ -130,6 +139,6 @@ pybullet-from-source:
 	  2>/dev/null || { echo "which needs Python's headers: apt install python3-dev" >&2; exit 1; }
 	@$(PIP) install pybullet $(UNWARNED)
 
-$(VENV)/colcon: $(READY)
+$(VENV)/colcon: $(COMPLETE)
 	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[colcon]' $(UNWARNED)
 	@touch $@

@@ -22,14 +22,6 @@ from ragdoll_ros.fit import command as fit  # noqa: E402
 
 SIZE = {'width': 1000, 'height': 600}
 
-LOOK = """([eye, at]) => {
-  const {camera, cameraControl, nodeRefFromName: nodes} = window.__viserMutable;
-  const [from, to] = [eye, at].map(
-    point => camera.position.clone().set(...point).applyMatrix4(nodes[''].matrixWorld));
-  cameraControl.setLookAt(...from, ...to, false);
-}"""
-"""Places a page's camera, m, z up."""
-
 
 def look(view: browser.View, away: float, high: float, at: float, azimuth: float = -0.2) -> None:
     """Place the camera before the doll.
@@ -38,7 +30,7 @@ def look(view: browser.View, away: float, high: float, at: float, azimuth: float
     doll's left, and looks at the height ``at``, m.
     """
     eye = (away * np.cos(azimuth), away * np.sin(azimuth), high)
-    view.page.evaluate(LOOK, [eye, (0.0, 0.0, at)])
+    view.look(eye, (0.0, 0.0, at))
     shot(view)
 
 

@@ -65,6 +65,14 @@ BODIES = """() => {
 }"""
 """Matrices that the graphics card gets of each instance, by batch, column by column; z up."""
 
+LOOK = """([eye, at]) => {
+  const {camera, cameraControl, nodeRefFromName: nodes} = window.__viserMutable;
+  const [from, to] = [eye, at].map(
+    point => camera.position.clone().set(...point).applyMatrix4(nodes[''].matrixWorld));
+  cameraControl.setLookAt(...from, ...to, false);
+}"""
+"""Places a page's camera, m, z up."""
+
 TO_PIXELS = """points => {
   const {camera, canvas, nodeRefFromName: nodes} = window.__viserMutable;
   const frame = canvas.getBoundingClientRect();
@@ -146,6 +154,10 @@ class View:
     def pixels(self, points):
         """Where points (n, 3) m of the world are on the page: (n, 2), as the mouse counts."""
         return np.array(self.page.evaluate(TO_PIXELS, np.asarray(points).tolist()))
+
+    def look(self, eye, at):
+        """Place the camera at a point (3,) m, looking at another one, z up."""
+        self.page.evaluate(LOOK, [list(map(float, eye)), list(map(float, at))])
 
     def wait(self, condition, patience=PATIENCE):
         """Wait until a condition holds, s at the most; what it said. The page goes on meanwhile."""

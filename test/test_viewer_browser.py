@@ -104,7 +104,7 @@ def test_a_button_or_a_key_pushes(view, act, axis, sign):
 @pytest.mark.parametrize('click', [
     lambda view: view.press('Reset'),
     pytest.param(lambda view: view.page.get_by_label('Contacts').click(), marks=pytest.mark.slow),
-    pytest.param(lambda view: view.page.locator('.mantine-Slider-root').click(),
+    pytest.param(lambda view: view.page.locator('.mantine-Slider-root').first.click(),
                  marks=pytest.mark.slow)], ids=['button', 'checkbox', 'slider'])
 def test_what_was_clicked_gives_the_keys_back(view, click):
     """Else Space would press it again, and the arrow keys would move it, or nothing."""
@@ -118,7 +118,8 @@ def test_what_was_clicked_gives_the_keys_back(view, click):
 @pytest.mark.slow  # test_viewer.py has what the camera is told
 def test_the_camera_follows_on_demand(view):
     """Pushed away the doll is at the middle of the picture, and after a reset again."""
-    middle = np.array((SIZE['width'], SIZE['height'])) / 2
+    canvas = view.page.locator('canvas').first.bounding_box()
+    middle = np.array((canvas['width'], canvas['height'])) / 2
     masses = [bone.mass for bone in SCENE.bones]
 
     def off():
@@ -132,6 +133,7 @@ def test_the_camera_follows_on_demand(view):
     go_on(view)
     view.wait(lambda: view.bodies(SCENE)[0][1] < -0.2)
     view.key(' ')
+    view.button('Resume').wait_for()
     view.wait(lambda: off() < 2)
     view.hold_at(SCENE, START)
     view.wait(lambda: off() < 2)

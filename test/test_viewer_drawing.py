@@ -28,6 +28,7 @@ from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Rods
 from ragdoll_ros.viewer.drawing import framing
 from ragdoll_ros.viewer.drawing.bodies import Bodies
+from ragdoll_ros.viewer.drawing.joint_balls import joint_balls
 from ragdoll_ros.viewer.drawing.joint_limits import ARC_SEGMENTS, RIM, SPOKES, JointLimits
 from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, SEGMENTS
 from ragdoll_ros.viewer.drawing.overlays import arrow_to_surface
@@ -323,3 +324,25 @@ def test_the_ground_is_below_all_dolls_seen_from_home(name):
     apart = 300 / np.tan(0.4) * eye[2] * cell / (reach / 2) ** 2
     assert apart > 1.5
     assert (cell, reach) == (CELL, FADE) or name != 'drop'
+
+
+def test_a_ball_at_each_joint_reaches_into_both_bones():
+    """Of points all over a ball some are within the one bone and some within the other."""
+    scene = load_scene('drop')
+    doll = scene.dolls[0].doll
+    balls = joint_balls(scene)
+    assert len(balls) == len(doll.joints) == 9
+    points = np.random.default_rng(1).normal(size=(2000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    for joint, (parent, child, ball) in zip(doll.joints, balls, strict=True):
+        assert (doll.bones[parent].name, doll.bones[child].name) == (joint.parent, joint.child)
+        centre = doll.bones[parent].pose.apply(np.array(ball.position))
+        np.testing.assert_allclose(centre, joint.anchor, atol=1e-12)
+        for bone in (doll.bones[parent], doll.bones[child]):
+            local = bone.pose.apply_inverse(centre + ball.size[0] / 2 * points)
+            assert (np.abs(local) < bone.shape.half_extents).all(axis=1).any()
+
+
+def test_a_large_crowd_has_no_balls_at_its_joints():
+    assert len(joint_balls(load_scene('crowd'))) == 90
+    assert joint_balls(load_scene('field')) == []

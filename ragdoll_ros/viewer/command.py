@@ -127,7 +127,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--port', type=port, help=f'port ({PORT}, or the next free one)')
     parser.add_argument('--start-after', type=seconds, metavar='S', help='resume a node that was '
                         'started with start_paused once a page shows it, or after S seconds '
-                        'without a page')
+                        'without a page; the first page then begins again')
     parser.add_argument('--folder', help='where the page saves and loads scenes and uploaded '
                         f'characters (~/{DEFAULT_FOLDER}, created if missing); pages can write '
                         'nowhere else')

@@ -10,11 +10,14 @@ import viser
 from ..files.config import scene_names
 from ..model.errors import RagdollError
 from ..physics.engine.registry import ENGINES
-from .push_keys import PushKeys
+from .pushing.push_keys import PushKeys
 from .sources.source import Frame, Source, SourceStatus
 
 REAL_TIME_FACTORS = (0.05, 2.0)
 """Smallest and largest of the slider."""
+
+FIRST_SCENES = {'Doll': 'drop', 'Person': 'man_faints', 'Hair': 'ponytail', 'Crowd': 'crowd'}
+"""Scenes to begin with, one click away, by the labels of their buttons."""
 
 OTHER = '(other)'
 """Stands for a scene that is not in config/."""
@@ -49,11 +52,15 @@ class Controls:
             hint='simulated time per wall time')
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
+        self.first_scenes = gui.add_button_group(
+            'Try', tuple(FIRST_SCENES), visible=is_simulated, hint='the default doll, a man who '
+            'faints, a doll with hair, ten dolls')
         self.engine = gui.add_dropdown('Engine', ENGINES, initial_value=ENGINES[0],
                                        visible=is_simulated,
                                        hint='physics engine; another one restarts the scene')
         self.real_time_factor.on_update(self._on_real_time_factor)
         self.scene.on_update(self._on_scene)
+        self.first_scenes.on_click(self._on_first_scene)
         self.engine.on_update(self._on_engine)
         for button, label, key, action in (
                 (self.pause, 'Pause or resume', 'space', self.toggle_pause),
@@ -118,6 +125,12 @@ class Controls:
         if name != OTHER:
             self._try(event.client, lambda: self.source.load(name),
                       lambda: self.show_scene(self._shown_scene))
+
+    async def _on_first_scene(self, event: viser.GuiEvent) -> None:
+        """Load the scene of a button."""
+        name = FIRST_SCENES[event.target.value]
+        self._try(event.client, lambda: self.source.load(name),
+                  lambda: self.show_scene(self._shown_scene))
 
     async def _on_engine(self, event: viser.GuiEvent) -> None:
         """Set the chosen engine; see _on_scene."""

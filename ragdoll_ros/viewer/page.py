@@ -10,6 +10,7 @@ import viser
 from ..model.scene import Scene
 from .browser.scripts import script, style
 from .controls import Controls
+from .drawing.auto_follow import AutoFollow
 from .drawing.camera import Cameras
 from .drawing.display_options import DisplayOptions, configure_theme
 from .drawing.plots import Plots
@@ -17,6 +18,8 @@ from .drawing.stage import Stage, configure_lights
 from .editor.editor import Editor
 from .editor.handles import ROOT
 from .pointer import Pointer
+from .pushing.hover import Hover
+from .pushing.motion import doll_mean
 from .recording_panel import RecordingPanel
 from .settings_panel import SettingsPanel
 from .sources.source import Frame, RequestedData, Source, SourceStatus
@@ -30,8 +33,8 @@ PERIOD = 1 / 60
 IDLE_PERIOD = 0.1
 """s between two checks for an open page."""
 
-SIMULATION_HINT = ('Drag a bone. Arrow keys push: tap or hold. Space pauses, R resets, E edits, '
-                   'H shows the home view.')
+SIMULATION_HINT = ('Drag a bone. Arrow keys push, tap or hold; a click on a bone chooses which. '
+                   'Space pauses, R resets, E edits, H shows the home view.')
 RECORDING_HINT = ('A recorded run. Space pauses, R restarts, drag Time or press J, K, L to look '
                   'back, H shows the home view.')
 
@@ -78,8 +81,9 @@ class Page:
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
         self.cameras = Cameras(server)
-        self._pointer = Pointer(source, self._grabbable_frame, lambda bone: (
-            self.editor and self.editor.select(bone)))
+        self._auto_follow = AutoFollow(self.display.follow)
+        self._hover = Hover(server)
+        self._pointer = Pointer(source, self._grabbable_frame, self._select)
 
     def run(self, stop: threading.Event) -> None:
         """Draw until ``stop`` is set."""
@@ -96,11 +100,13 @@ class Page:
         is_open = bool(clients)
         self.source.request(self.display.requested if is_open else RequestedData())
         self.controls.pushes.update(time.monotonic())
+        frame = self.source.frame if is_open else None
         if is_open:
             frames, status = self.source.take_frames(), self.source.status
-            now = time.monotonic()
-            for frame in frames:
-                self._keep(frame, status, now)
+            start, now = self.start_when_visible, time.monotonic()
+            for new in frames:
+                if start is None or not start.hides(new):
+                    self._keep(new, status, now)
             if self._live is not None:
                 self._show(self._live, status, now)
             if self.stage is not None:
@@ -112,7 +118,7 @@ class Page:
             self._show_messages(status.problem, status.note)
             self.controls.show(status)
         if self.start_when_visible is not None:
-            self.start_when_visible.update(clients, self.frame is not None, time.monotonic())
+            self.start_when_visible.update(clients, frame, time.monotonic())
         return is_open
 
     def _keep(self, frame: Frame, status: SourceStatus, now: float) -> None:
@@ -120,6 +126,7 @@ class Page:
         self._live = frame
         self._recording.add(frame)
         self.timeline.add(frame)
+        self.controls.pushes.add(frame)
         self.plots.add(frame, self.timeline.live_instant(frame), status, now)
 
     def _show(self, live: Frame, status: SourceStatus, now: float) -> None:
@@ -130,9 +137,25 @@ class Page:
             self._draw(frame)
             if self.timeline.is_live:
                 self.cameras.show(frame)
-        self.cameras.follow(frame, now, self.display.follow.value)
+                self._follow_if_it_leaves(frame)
+        bone = self.controls.pushes.bone
+        self.cameras.follow(frame, bone, now, self.display.follow.value)
+        self._hover.show(frame, self.controls.pushes.motion, now)
         self.controls.show_rest(live, status.paused, now)
         self.settings.show(status, live.scene, now)
+
+    def _follow_if_it_leaves(self, frame: Frame) -> None:
+        pushes = self.controls.pushes
+        self._auto_follow.update(
+            self.server.get_clients(), frame,
+            doll_mean(frame.scene, pushes.bone, frame.state.positions),
+            pushes.motion.doll_velocity(pushes.bone))
+
+    def _select(self, bone: str) -> None:
+        """Push a bone that was clicked from now on, and edit it."""
+        self.controls.pushes.choose(bone)
+        if self.editor is not None:
+            self.editor.select(bone)
 
     def _grabbable_frame(self) -> Frame | None:
         """The shown frame; None if it is in the past, where nothing can be grabbed."""

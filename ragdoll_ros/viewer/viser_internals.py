@@ -13,7 +13,7 @@ import viser
 VERSIONS = '>=1.1.1,<1.2'
 
 CLIENT_NAMES = ('__viserMutable', 'sendMessage', 'scene', 'nodeRefFromName', 'camera',
-                'cameraControl', 'requestRender', 'GuiUpdateMessage', 'Uploading ')
+                'cameraControl', 'requestRender', 'canvas', 'GuiUpdateMessage', 'Uploading ')
 """What browser/*.js uses of viser's own client: its mutable state, a message, a notice's text."""
 
 CLIENT_PACKAGES = {'@mantine/core': '^9.', '@mantine/notifications': '^9.',

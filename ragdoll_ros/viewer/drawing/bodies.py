@@ -17,6 +17,7 @@ from ...model.ragdoll import DEFAULT_COLOR
 from ...model.scene import Scene
 from ...model.shapes import Part
 from ...model.state import State
+from .joint_balls import joint_balls
 from .meshes import COARSE, MESHES
 
 OPACITY = 0.45
@@ -52,6 +53,9 @@ class Bodies:
                  skinned: Collection[int] = ()) -> None:
         self._server = server
         self.batches: list[Batch] = []
+        """The bones."""
+        self._balls: list[Batch] = []
+        """At their joints."""
         parts = [(index, part) for index, bone in enumerate(scene.bones)
                  for part in bone.shape.primitives]
         self._meshes = MESHES if len(parts) <= CROWD else COARSE
@@ -60,11 +64,22 @@ class Bodies:
             selected = [(index, part) for index, part in parts
                         if part.kind == kind and (index in skinned) == below_skin]
             for first in range(0, len(selected), BATCH_SIZE):
-                self._add(selected[first:first + BATCH_SIZE], below_skin, colors, state)
+                chunk = selected[first:first + BATCH_SIZE]
+                self.batches.append(self._batch(
+                    f'/scene/bodies/{kind}_{len(self.batches)}', chunk, below_skin,
+                    colors[[index for index, _ in chunk]], state))
+        balls = joint_balls(scene)
+        for below_skin in (False, True):
+            chosen = [ball for ball in balls if (ball[0] in skinned) == below_skin]
+            if chosen:
+                self._balls.append(self._batch(
+                    f'/scene/joints/{int(below_skin)}', [(parent, ball) for parent, _, ball in
+                                                         chosen], below_skin,
+                    colors[[child for _, child, _ in chosen]], state))
 
-    def _add(self, chunk: list[tuple[int, Part]], skinned: bool, colors: np.ndarray,
-             state: State) -> None:
-        """Add a batch of parts of one shape, each with the index of its bone."""
+    def _batch(self, name: str, chunk: list[tuple[int, Part]], skinned: bool, colors: np.ndarray,
+               state: State) -> Batch:
+        """A batch of parts of one shape, each with the index of its bone, in ``colors`` (p, 3)."""
         bones = np.array([index for index, _ in chunk])
         parts = [part for _, part in chunk]
         kind = parts[0].kind
@@ -73,21 +88,21 @@ class Bodies:
             np.array([part.orientation for part in parts]))
         positions, wxyzs = _part_poses(state, bones, local_pose)
         handle = self._server.scene.add_batched_meshes_simple(
-            f'/scene/bodies/{kind}_{len(self.batches)}', *self._meshes[kind], wxyzs, positions,
+            name, *self._meshes[kind], wxyzs, positions,
             batched_scales=np.array([part.size for part in parts]),
-            batched_colors=np.round(colors[bones] * 255).astype(np.uint8), lod='off')
-        self.batches.append(Batch(kind, skinned, handle, bones, local_pose))
+            batched_colors=np.round(colors * 255).astype(np.uint8), lod='off')
+        return Batch(kind, skinned, handle, bones, local_pose)
 
     def show(self, state: State) -> None:
         """Draw a state."""
-        for batch in self.batches:
+        for batch in (*self.batches, *self._balls):
             positions, wxyzs = _part_poses(state, batch.bones, batch.local_pose)
             batch.handle.batched_positions = positions
             batch.handle.batched_wxyzs = wxyzs
 
     def set_visible(self, visible: bool, translucent: bool) -> None:
         """Show or hide the bones below skins; others stay visible."""
-        for batch in self.batches:
+        for batch in (*self.batches, *self._balls):
             if batch.skinned:
                 batch.handle.visible = visible
                 batch.handle.opacity = OPACITY if translucent else None

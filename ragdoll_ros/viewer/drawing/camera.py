@@ -5,6 +5,7 @@ import numpy as np
 import viser
 
 from ..browser.scripts import script
+from ..pushing.motion import doll_mean
 from ..sources.source import Frame
 from .framing import bounding_spheres, box_center, home_position, sees_all
 
@@ -31,9 +32,12 @@ ASPECT = 1.2
 
 FOLLOWED_NODE = '/followed'
 
+DOLL_NODE = '/doll'
+"""At the centre of mass of the pushed doll, for edge_arrow.js."""
+
 
 class Cameras:
-    """Moves the cameras of all pages to the home view, or with the first doll.
+    """Moves the cameras of all pages to the home view, or with the pushed doll.
 
     They stop while a hand holds something: the drag target moves with the camera.
     """
@@ -42,6 +46,9 @@ class Cameras:
         self._server = server
         self._frame: Frame | None = None
         self._node: viser.FrameHandle | None = None
+        self._doll = server.scene.add_frame(DOLL_NODE, show_axes=False)
+        self._bone = 0
+        """Index of the pushed bone."""
         self._homes: dict[int, tuple[np.ndarray, float]] = {}
         """Position of each page's home view, and the aspect it was computed for."""
         self._before_follow: dict[int, tuple[np.ndarray, np.ndarray]] = {}
@@ -50,6 +57,7 @@ class Cameras:
         server.initial_camera.position, server.initial_camera.look_at = INITIAL_CAMERA
         server.initial_camera.fov = FIELD_OF_VIEW
         server.gui.add_html(script('camera_follow.js', NODE=FOLLOWED_NODE))
+        server.gui.add_html(script('edge_arrow.js', NODE=DOLL_NODE))
         server.on_client_connect(self._on_connect)
 
     def show(self, frame: Frame) -> None:
@@ -74,15 +82,18 @@ class Cameras:
         camera = client.camera
         look_at = box_center(*spheres)
         if self._node is not None:  # its position may be of the scene before
-            self._node.position = look_at = _center_of_mass(self._frame)
+            self._node.position = look_at = self._center(self._frame)
         position = home_position(*spheres, look_at, camera.fov, _aspect(camera))
         self._homes[client.client_id] = position, _aspect(camera)
         camera.up_direction = (0.0, 0.0, 1.0)
         self._move(client, position, look_at)
         camera.far = max(FAR, 3 * float(np.linalg.norm(position - look_at)))
 
-    def follow(self, frame: Frame, now: float, follow: bool) -> None:
-        """Follow a frame at ``now`` s of a steady clock, or return to the views before."""
+    def follow(self, frame: Frame, bone: int, now: float, follow: bool) -> None:
+        """Follow the doll of a bone at ``now`` s of a steady clock, or return to former views."""
+        self._bone = bone
+        if np.abs(self._center(frame) - self._doll.position).max() > TOLERANCE:
+            self._doll.position = self._center(frame)
         if not follow and self._node is not None:
             self._node.remove()
             self._node = None
@@ -95,7 +106,12 @@ class Cameras:
                 self._before_follow = {client_id: (client.camera.position, client.camera.look_at)
                               for client_id, client in self._server.get_clients().items()}
                 self._node = self._server.scene.add_frame(FOLLOWED_NODE, show_axes=False)
-            self._node.position = _center_of_mass(frame)
+            self._node.position = self._center(frame)
+
+    def _center(self, frame: Frame) -> np.ndarray:
+        """Centre of mass (3,) m of the pushed doll, world frame."""
+        bone = self._bone if self._bone < len(frame.scene.bones) else 0
+        return doll_mean(frame.scene, bone, frame.state.positions)
 
     def _on_connect(self, client: viser.ClientHandle) -> None:
         """Show the home view to a new page, and again when its window is resized while in it.
@@ -127,13 +143,6 @@ class Cameras:
         with client.atomic():
             client.camera.position = position
             client.camera.look_at = look_at
-
-
-def _center_of_mass(frame: Frame) -> np.ndarray:
-    """Centre of mass (3,) m of the first doll, world frame."""
-    part = frame.scene.bone_slices[0]
-    return np.average(frame.state.positions[part], axis=0,
-                      weights=[bone.mass for bone in frame.scene.bones[part]])
 
 
 def _scene_key(frame: Frame) -> tuple[str, int]:

@@ -22,7 +22,8 @@ class DisplayOptions:
         with server.gui.add_folder('Show'):
             self.follow = server.gui.add_checkbox(
                 'Follow', initial_value=False,
-                hint='the camera moves with the first doll; it returns when this is switched off')
+                hint='the camera moves with the pushed doll; it returns when this is switched off; '
+                'it comes on by itself when the doll would leave the picture')
             self.contacts = server.gui.add_checkbox(
                 'Contacts', initial_value=False, hint='contact points, yellow, and normal forces: '
                 'a line of 1 m is the weight of the first doll')

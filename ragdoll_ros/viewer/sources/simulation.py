@@ -46,7 +46,10 @@ COMMAND_TIMEOUT = 60.0
 
 
 class SimulationSource(Source):
-    """Simulates a scene in wall time while a page is open; pushes go to the first doll's root."""
+    """Simulates a scene in wall time while a page is open.
+
+    Pushes go to the first doll's root until another bone is chosen.
+    """
 
     def __init__(self, scene: Scene, engine: str = 'auto') -> None:
         self._commands: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
@@ -55,6 +58,7 @@ class SimulationSource(Source):
         self._new_frames: deque[Frame] = deque(maxlen=MAX_NEW_FRAMES)
         self._runs = 0
         """Number of runs of the simulations before this one."""
+        self._pushed_bone = ''
         self._statistics = TickStatistics()
         self._simulation = Simulation(scene, engine=engine, workers='auto')
         self._status = SourceStatus(
@@ -78,12 +82,22 @@ class SimulationSource(Source):
     def status(self) -> SourceStatus:
         return self._status
 
+    @property
+    def pushed_bone(self) -> str:
+        scene = self._simulation.scene
+        if self._pushed_bone in scene.bone_names:
+            return self._pushed_bone
+        return scene.qualified(scene.dolls[0], scene.dolls[0].doll.root.name)
+
     def request(self, requested: RequestedData) -> None:
         if requested != self._requested:
             self._commands.put(lambda: self._set_requested(requested))
 
     def push(self, force: Vector, duration: float) -> None:
         self._commands.put(lambda: self._push(force, duration))
+
+    def push_bone(self, bone: str) -> None:
+        self._pushed_bone = bone
 
     def pause(self, paused: bool) -> bool:
         self._commands.put(lambda: self._update_status(paused=paused))
@@ -178,10 +192,7 @@ class SimulationSource(Source):
         self._pacer.start(time.monotonic_ns())
 
     def _push(self, force: Vector, duration: float) -> None:
-        scene = self._simulation.scene
-        doll = scene.dolls[0]
-        bone = scene.qualified(doll, doll.doll.root.name)
-        self._simulation.push(Push(bone, force, duration=duration), 'page')
+        self._simulation.push(Push(self.pushed_bone, force, duration=duration), 'page')
 
     @staticmethod
     def _move_hand(move: Callable[[], None]) -> None:

@@ -118,11 +118,19 @@ class Source(Protocol):
     def status(self) -> SourceStatus:
         """The current status."""
 
+    @property
+    def pushed_bone(self) -> str:
+        """Name of the bone that pushes act on; empty if unknown."""
+        return ''
+
     def request(self, requested: RequestedData) -> None:
         """Set which data the page needs from now on."""
 
     def push(self, force: Vector, duration: float) -> None:
         """Push the pushed bone by N, world axes, for ``duration`` s simulated or until the next."""
+
+    def push_bone(self, bone: str) -> None:
+        """Let pushes act on another bone of the scene."""
 
     def pause(self, paused: bool) -> bool:
         """Pause or resume; False if that is not possible yet, because no node is running."""

@@ -113,6 +113,10 @@ class NodeSource(Source):
                                    engine=self._scene.settings.engine,
                                    accuracy=self._scene.settings.accuracy)
 
+    @property
+    def pushed_bone(self) -> str:
+        return self._scene.settings.pushed_bone
+
     def request(self, requested: RequestedData) -> None:
         if requested != self._requested:
             self._requested = requested
@@ -120,6 +124,9 @@ class NodeSource(Source):
 
     def push(self, force: Vector, duration: float) -> None:
         self._force.send(force, duration / self._reported.real_time_factor)
+
+    def push_bone(self, bone: str) -> None:
+        self._services.set_parameter('pushed_bone', bone)
 
     def pause(self, paused: bool) -> bool:
         return self._services.pause(paused)

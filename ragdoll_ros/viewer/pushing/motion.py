@@ -1,0 +1,51 @@
+"""Velocities of the bones from their places in successive frames, which every source has."""
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from ...model.scene import Scene
+from ..sources.source import Frame
+
+SPAN = 0.015
+"""s of simulated time over which a velocity is measured at least: one or two frames."""
+
+
+class Motion:
+    """Velocities in the newest frame; zero before a second one. Not thread-safe."""
+
+    def __init__(self) -> None:
+        self._frames: deque[Frame] = deque()
+
+    @property
+    def frame(self) -> Frame | None:
+        """The newest frame; None before the first."""
+        return self._frames[-1] if self._frames else None
+
+    def add(self, frame: Frame) -> None:
+        """Take note of a new frame; an earlier one, or another scene, starts anew."""
+        last = self.frame
+        if last is not None and (frame.scene is not last.scene or frame.time < last.time):
+            self._frames.clear()
+        elif last is not None and frame.time == last.time:
+            self._frames.pop()
+        self._frames.append(frame)
+        while len(self._frames) > 2 and frame.time - self._frames[1].time >= SPAN:
+            self._frames.popleft()
+
+    def velocities(self) -> np.ndarray:
+        """Velocities of the bones' centres of mass, (n, 3) m/s."""
+        first, last = self._frames[0], self._frames[-1]
+        moved = last.state.positions - first.state.positions
+        return moved / (last.time - first.time) if last.time > first.time else np.zeros_like(moved)
+
+    def doll_velocity(self, bone: int) -> np.ndarray:
+        """Velocity (3,) m/s of the centre of mass of the doll that has a bone."""
+        return doll_mean(self._frames[-1].scene, bone, self.velocities())
+
+
+def doll_mean(scene: Scene, bone: int, vectors: np.ndarray) -> np.ndarray:
+    """Mean of vectors (n, 3) of all bones over the doll that has a bone, weighted by mass."""
+    part = scene.bone_slices[scene.doll_of_bone[bone]]
+    return np.average(vectors[part], axis=0, weights=[each.mass for each in scene.bones[part]])

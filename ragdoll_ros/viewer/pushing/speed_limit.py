@@ -1,0 +1,46 @@
+"""Limits pushes so that they accelerate a doll to a speed, not beyond."""
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+RESPONSE_TIME = 0.15
+"""s in which the force of a held key would give the speed that is missing: too short to be felt,
+and longer than DELAY, so that the speed is not passed."""
+
+LONGEST = 0.1
+"""s simulated that a push may last where a busy machine ends it late: a node's push_timeout."""
+
+DELAY = 0.12
+"""s of wall time until a push shows in the frames: a node's messages take that there and back."""
+
+
+class SpeedLimit:
+    """The impulse that a speed leaves.
+
+    ``time``: s simulated, of the newest frame. By that clock a push that was sent still takes as
+    long to show where a busy machine delays frames. Not thread-safe.
+    """
+
+    def __init__(self) -> None:
+        self._recent: deque[tuple[float, np.ndarray]] = deque()
+        """Time until which a push that was sent does not show; its largest impulse, (3,) N s."""
+
+    def impulse(self, direction: np.ndarray, missing: float, mass: float, time: float) -> float:
+        """Impulse, N s, 0 or more, along the unit vector ``direction`` (3,).
+
+        ``missing``: speed, m/s, that a doll of ``mass`` kg lacks in the newest frame.
+        """
+        while self._recent and self._recent[0][0] <= time:
+            self._recent.popleft()
+        on_the_way = sum((float(impulse @ direction) for _, impulse in self._recent), 0.0)
+        return max(0.0, mass * missing - on_the_way)
+
+    def sent(self, force: np.ndarray, time: float, real_time_factor: float) -> None:
+        """Take note of the force (3,) N of a push that is sent now."""
+        self._recent.append((time + DELAY * real_time_factor, force * LONGEST))
+
+    def clear(self) -> None:
+        """Forget all pushes, as at a reset."""
+        self._recent.clear()
