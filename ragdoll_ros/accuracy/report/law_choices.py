@@ -24,6 +24,7 @@ in a way that no engine here represents.
 - **Friction.** Coulomb's law is that of a point: a cone in ours and PyBullet, a pyramid in DART, \
 a smooth approximation in MuJoCo and Drake, which creep where others stick. The mechanics of \
 rigid bodies does not determine the pressure under a face nor, with that, how sliding and spinning \
-reduce each other's friction. Each engine supports a face by a few points of its own choice. The \
+reduce each other's friction. Ours is that of an affine pressure over the whole face, while a face \
+slips; the other engines support a face by a few points of their own choice. The \
 short segments show what this amounts to: without restitution and friction the engines come \
 together as steps get finer; with friction each comes to an end of its own."""

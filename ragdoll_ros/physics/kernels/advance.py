@@ -17,6 +17,7 @@ One tick of a cluster, and what its stages read and write:
             unconstrained_velocity  middle, loads, springs -> v_free, factor of the mass matrix
             find_contacts           middle, gaps_active -> contacts
             warm_start              last contacts -> impulses
+            set_slip_friction       middle, impulses -> friction points of faces that slip
             solve_contacts          contacts, v_free -> v_change, correction   islands
           finish_step            v_end, correction -> q_end, v_end, gaps_end   position correction
           update_bracket, next_trial_step   gaps_end -> length of the next trial

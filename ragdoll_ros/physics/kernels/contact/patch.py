@@ -1,4 +1,6 @@
-"""Friction points of a contact patch, so that its friction acts as that of its whole area."""
+"""Friction points of a contact patch, so that its friction against turning about its middle is that
+of its whole area; those of a patch that slips: patch_friction.py.
+"""
 from __future__ import annotations
 
 import math
