@@ -242,7 +242,7 @@ def test_a_run_is_played_back(browser, states, tmp_path):
 def test_the_view_is_saved_as_png(view, tmp_path):
     """As large as the page is drawn, white beside the doll, and not where the torso is seen.
 
-    Viser draws three quarters of the pixels each way where a page is slow.
+    Viser draws three quarters of the pixels each way at least where a page is slow.
     """
     view.hold_at(SCENE, START)
     with view.page.expect_download() as download:
@@ -252,7 +252,9 @@ def test_the_view_is_saved_as_png(view, tmp_path):
     share = picture.shape[0] / SIZE['height']
     x, y = (view.pixels(START[:1])[0] * share).astype(int)
     width = view.page.locator('canvas').first.bounding_box()['width']
-    assert share >= 0.75 * SHARPNESS and picture.shape[1:] == (share * width, 3)
+    assert share >= 0.75 * SHARPNESS and picture.shape[2] == 3
+    # Viser rounds both sides to pixels, and draws any share of them where a page is slow.
+    assert picture.shape[1] == pytest.approx(share * width, abs=1)
     assert (picture[2, 2] == 255).all() and picture[y, x].min() < 200
 
 
@@ -445,8 +447,9 @@ def test_plots_are_drawn_of_another_scene(view):
         view.row('Scene').locator('input').first.click()
         view.page.get_by_role('option', name=scene, exact=True).click()
         view.tab('Plots')
-        view.wait(lambda: len(ends := view.page.evaluate(ENDS)) == 3 and min(ends) > 0.5
-                  and max(ends) < 2)
+        # The page looks itself, with each picture: asked from here, it may be 2 s further each time.
+        view.page.wait_for_function(f'() => {{ const ends = ({ENDS})(); return ends.length === 3'
+                                    ' && Math.min(...ends) > 0.5 && Math.max(...ends) < 2; }')
 
 
 def upload(view, button, name, content):
