@@ -447,7 +447,7 @@ def test_plots_are_drawn_of_another_scene(view):
         view.row('Scene').locator('input').first.click()
         view.page.get_by_role('option', name=scene, exact=True).click()
         view.tab('Plots')
-        # The page looks itself, with each picture: asked from here, it may be 2 s further each time.
+        # The page looks itself, with each picture: from here each look may come 2 s later.
         view.page.wait_for_function(f'() => {{ const ends = ({ENDS})(); return ends.length === 3'
                                     ' && Math.min(...ends) > 0.5 && Math.max(...ends) < 2; }')
 
