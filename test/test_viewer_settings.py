@@ -112,9 +112,9 @@ def test_what_is_said_of_a_scene_is_not_of_the_one_before():
 
 def test_the_accuracy_by_the_dropdown_and_its_price(page):
     wait(lambda: ' ms. Typical error' in page.settings.cost.content)
-    assert '0.2 mm' in page.settings.cost.content
+    assert '0.6 mm' in page.settings.cost.content
     page.source.set_engine('bullet')
-    wait(lambda: '13 mm' in page.settings.cost.content)
+    wait(lambda: '5 mm' in page.settings.cost.content)
     page.source.set_engine('auto')
     wait(lambda: 'tick' in page.settings.health.figures.content)
     assert GREEN in page.settings.health.dot.content
