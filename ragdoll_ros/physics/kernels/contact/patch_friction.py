@@ -49,18 +49,18 @@ LONGEST = 4.0
 
 @compiled
 def set_slip_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, m: int,
-                      in_step: bool) -> None:
+                      h: float) -> None:
     """Set friction points and coefficients of the patches among m found contacts, where friction
-    has a limit, for the velocities of ``kin``, which is that of q. ``in_step``: after warm_start();
-    start_velocity becomes that of the new points.
+    has a limit, for the velocities of ``kin``, which is that of q, over a step of h s, after
+    warm_start(); start_velocity becomes that of the new points. h = 0: an impact.
     """
     found, begin = ws.contacts.found, 0
     while begin < m:
         end = patch_end(found, begin, m)
         if end - begin > 1 and found[begin].kind != LIMIT:
-            known = known_contact(found, begin, end, in_step)
+            known = known_contact(found, begin, end, h > 0)
             if known >= 0:
-                spread_over_patch(s, ws, kin, q, begin, end, known, in_step)
+                spread_over_patch(s, ws, kin, q, begin, end, known, h)
         begin = end
 
 
@@ -99,9 +99,9 @@ def slip_at(s: System, kin: Kinematics, q: np.ndarray, c: np.record,
 
 @compiled
 def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, begin: int,
-                      end: int, known: int, in_step: bool) -> None:
+                      end: int, known: int, h: float) -> None:
     """Set friction points and coefficients of contacts begin to end - 1, a patch, with the known
-    contact known_contact().
+    contact known_contact(), over a step of h s.
     """
     found, total, count = ws.contacts.found, 0.0, end - begin
     middle = pressed = mean = (0.0, 0.0, 0.0)
@@ -124,7 +124,9 @@ def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
         slip, arm = slip_at(s, kin, q, found[known], pressed), sub(pressed, center)
         x, y = dot(vec(found[begin].tangents[0]), arm), dot(vec(found[begin].tangents[1]), arm)
         part = pressed_part(ws.contacts, count, face, x, y)
-        if part[0] > POINTLIKE and is_steady(found[known], pressed, slip, part[0] * size, in_step):
+        slow = h * found[known].friction * norm(vec(s.gravity))
+        if part[0] > POINTLIKE and (h == 0.0 or is_steady(
+                found[known], pressed, slip, part[0] * size, slow)):
             turn_about(ws.contacts, begin, end, center, face, part, (x, y),
                        (x - slip[1] / slip[2], y + slip[0] / slip[2]))
             return
@@ -136,18 +138,16 @@ def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
 
 @compiled
 def is_steady(c: np.record, at: Vec3, slip: tuple[float, float, float], size: float,
-              in_step: bool) -> bool:
-    """Whether a patch of this ``size``, m, with contact c slips, by ``slip`` at the point ``at``,
-    and if ``in_step`` hardly differently from how it did as the step began.
+              slow: float) -> bool:
+    """Whether a patch of this ``size``, m, with contact c slips by ``slip`` at the point ``at``,
+    hardly differently from how it did as the step began, and faster than ``slow``, m/s, of which
+    friction may leave nothing.
     """
-    speed = abs(slip[0]) + abs(slip[1]) + size * abs(slip[2])
-    if not in_step:
-        return True
-    arm = sub(at, vec(c.friction_point))
+    speed, arm = abs(slip[0]) + abs(slip[1]) + size * abs(slip[2]), sub(at, vec(c.friction_point))
     change = (abs(slip[0] - c.start_velocity[1] + c.spin * dot(vec(c.tangents[1]), arm))
               + abs(slip[1] - c.start_velocity[2] - c.spin * dot(vec(c.tangents[0]), arm))
               + size * abs(slip[2] - c.spin))
-    return c.persistent != 0 and change < UNSTEADY * speed
+    return c.persistent != 0 and speed > slow and change < UNSTEADY * speed
 
 
 @compiled
