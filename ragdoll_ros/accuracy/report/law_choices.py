@@ -22,9 +22,13 @@ joint passes them, and comes back later and with other velocities than from a ri
 PyBullet passes them as well, and corrects them over several steps. A body's own limits are soft, \
 in a way that no engine here represents.
 - **Friction.** Coulomb's law is that of a point: a cone in ours and PyBullet, a pyramid in DART, \
-a smooth approximation in MuJoCo and Drake, which creep where others stick. The mechanics of \
-rigid bodies does not determine the pressure under a face nor, with that, how sliding and spinning \
-reduce each other's friction. Ours is that of an affine pressure over the whole face, while a face \
-slips; the other engines support a face by a few points of their own choice. The \
-short segments show what this amounts to: without restitution and friction the engines come \
-together as steps get finer; with friction each comes to an end of its own."""
+a smooth approximation in MuJoCo and Drake, which creep where others stick. Both solve a \
+convex problem, in which what slides is also thrust off, the more the higher the friction \
+(Anitescu 2006). In MuJoCo's finest steps a forearm that slides at 0.2 m/s with µ = 0.7 \
+touches the ground in one step of a hundred, and after 0.1 s it is 3 mm from where Coulomb's law \
+has it, 1.3 mm of that upwards; with µ = 0.2 a tenth of that, and without friction nothing. \
+The mechanics of rigid bodies does not determine the pressure under a face nor, with that, how \
+sliding and spinning reduce each other's friction. Ours is that of an affine pressure over the \
+whole face, while a face slips; the other engines support a face by a few points of their own \
+choice. The short segments show what this amounts to: without restitution and friction the \
+engines come together as steps get finer; with friction each comes to an end of its own."""

@@ -4,8 +4,9 @@ A patch that slides and turns has an instantaneous center. Where the friction of
 to the share j of mu times the normal force, and has the mean lever arm m about the center, it is
 that of one point in whose direction it pulls, m / j from the center, with a coefficient of j mu:
 only there is the slip in line with it. Contacts get such points, and coefficients, that with their
-normal impulses of the last step the friction of the patch is exact. Elsewhere friction points are
-those of find_contacts.set_friction_points(): where a patch sticks, or its slip changes fast.
+normal impulses of the last step the friction of the patch is exact. Where its slip changes fast,
+the friction points of find_contacts.set_friction_points() are moved so that their center is that of
+pressure; where it sticks, they stay.
 """
 from __future__ import annotations
 
@@ -38,49 +39,45 @@ WEAK = 0.3
 """Share of the friction that is left in sum, below which its contacts have several directions, as
 in a patch that turns about its middle."""
 
+POINTLIKE = 0.25
+"""Share of a face below which its pressed part is as good as a point, about which it may pivot: its
+contacts could not represent more."""
+
 LONGEST = 4.0
 """Longest lever arm of a contact's friction, over the size of the patch."""
 
 
 @compiled
 def set_slip_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, m: int,
-                      in_step: bool) -> None:
-    """Set friction points and coefficients of those patches among m found contacts that slip at the
-    velocities of ``kin``, which is that of q. ``in_step``: only where the velocities at the step's
-    start, from warm_start(), hardly differ; start_velocity becomes that of the new points.
+                      h: float) -> None:
+    """Set friction points and coefficients of the patches among m found contacts, where friction
+    has a limit, for the velocities of ``kin``, which is that of q, over a step of h s, after
+    warm_start(); start_velocity becomes that of the new points. h = 0: an impact.
     """
     found, begin = ws.contacts.found, 0
     while begin < m:
         end = patch_end(found, begin, m)
-        size = norm(sub(vec(found[begin].point), vec(found[end - 1].point))) / 2
-        if end - begin > 1 and found[begin].kind != LIMIT and slips(
-                s, kin, q, found, begin, end, size, in_step):
-            spread_over_patch(s, ws, kin, q, begin, end, size)
+        if end - begin > 1 and found[begin].kind != LIMIT:
+            known = known_contact(found, begin, end, h > 0)
+            if known >= 0:
+                spread_over_patch(s, ws, kin, q, begin, end, known, h)
         begin = end
 
 
 @compiled
-def slips(s: System, kin: Kinematics, q: np.ndarray, contacts: np.ndarray, begin: int, end: int,
-          size: float, in_step: bool) -> bool:
-    """Whether contacts begin to end - 1 are a flat patch of this ``size``, m, that slips; if
-    ``in_step`` and steadily.
+def known_contact(contacts: np.ndarray, begin: int, end: int, in_step: bool) -> int:
+    """Index of a contact of a flat patch whose friction has a limit, if ``in_step`` rather one that
+    is persistent; -1 if there is none.
     """
     known = -1
     for e in range(begin, end):
         c = contacts[e]
         if dot(vec(c.normal), vec(contacts[begin].normal)) < FLAT:
-            return False
-        if known < 0 and 0 < c.friction < NO_SLIP and (c.persistent or not in_step):
+            return -1
+        if 0 < c.friction < NO_SLIP and (known < 0 or (
+                in_step and c.persistent and not contacts[known].persistent)):
             known = e
-    if known < 0:
-        return False
-    c = contacts[known]
-    a, b, turn = slip_at(s, kin, q, c, vec(c.friction_point))
-    speed, change = abs(a) + abs(b) + size * abs(turn), 0.0
-    if in_step:
-        change = (abs(a - c.start_velocity[1]) + abs(b - c.start_velocity[2])
-                  + size * abs(turn - c.spin))
-    return speed > STILL and change < UNSTEADY * speed
+    return known
 
 
 @compiled
@@ -102,43 +99,71 @@ def slip_at(s: System, kin: Kinematics, q: np.ndarray, c: np.record,
 
 @compiled
 def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, begin: int,
-                      end: int, size: float) -> None:
-    """Set friction points and coefficients of contacts begin to end - 1, a patch that slips."""
-    found, total, middle = ws.contacts.found, 0.0, (0.0, 0.0, 0.0)
-    for e in range(begin, end):
-        middle = add(middle, divide(vec(found[e].point), end - begin))
-    offset = 0.0, 0.0, 0.0
+                      end: int, known: int, h: float) -> None:
+    """Set friction points and coefficients of contacts begin to end - 1, a patch, with the known
+    contact known_contact(), over a step of h s.
+    """
+    found, total, count = ws.contacts.found, 0.0, end - begin
+    middle = pressed = mean = (0.0, 0.0, 0.0)
     for e in range(begin, end):
         c = found[e]
         total += c.impulse[0]
-        offset = add_scaled(offset, c.impulse[0], sub(vec(c.point), vec(c.friction_point)))
-    a, b, turn = slip_at(s, kin, q, found[begin], middle)
-    if math.sqrt(a * a + b * b) > FAR * size * abs(turn):
-        if total > 0.0:
-            for e in range(begin, end):
-                c = found[e]
-                set_friction(c, add_scaled(vec(c.friction_point), 1 / total, offset), 1.0)
+        middle = add_scaled(middle, 1 / count, vec(c.point))
+        pressed = add_scaled(pressed, c.impulse[0], vec(c.point))
+        mean = add_scaled(mean, c.impulse[0], vec(c.friction_point))
+    if total > 0.0:
+        pressed, mean = divide(pressed, total), divide(mean, total)
+    size = norm(sub(vec(found[begin].point), vec(found[end - 1].point))) / 2
+    a, b, turn = slip_at(s, kin, q, found[known], pressed if total > 0.0 else middle)
+    if not abs(a) + abs(b) + size * abs(turn) > STILL:
         return
-    center, face = measure_face(s, ws.contacts, kin, begin, end, middle)
-    a, b, turn = slip_at(s, kin, q, found[begin], center)
-    turn_about(ws.contacts, begin, end, center, face, -b / turn, a / turn)
+    if math.sqrt(a * a + b * b) < FAR * size * abs(turn):
+        center, face = measure_face(s, ws.contacts, kin, begin, end, middle)
+        if not total > 0.0:
+            pressed = center
+        slip, arm = slip_at(s, kin, q, found[known], pressed), sub(pressed, center)
+        x, y = dot(vec(found[begin].tangents[0]), arm), dot(vec(found[begin].tangents[1]), arm)
+        part = pressed_part(ws.contacts, count, face, x, y)
+        slow = h * found[known].friction * norm(vec(s.gravity))
+        if part[0] > POINTLIKE and (h == 0.0 or is_steady(
+                found[known], pressed, slip, part[0] * size, slow)):
+            turn_about(ws.contacts, begin, end, center, face, part, (x, y),
+                       (x - slip[1] / slip[2], y + slip[0] / slip[2]))
+            return
+    if total > 0.0:
+        for e in range(begin, end):
+            c = found[e]
+            set_friction(c, add(vec(c.friction_point), sub(pressed, mean)), 1.0)
 
 
 @compiled
-def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Face, x: float,
-               y: float) -> None:
-    """Set friction points and coefficients of a patch that turns about (x, y), from its center."""
-    found, count = contacts.found, end - begin
+def is_steady(c: np.record, at: Vec3, slip: tuple[float, float, float], size: float,
+              slow: float) -> bool:
+    """Whether a patch of this ``size``, m, with contact c slips by ``slip`` at the point ``at``,
+    hardly differently from how it did as the step began, and faster than ``slow``, m/s, of which
+    friction may leave nothing.
+    """
+    speed, arm = abs(slip[0]) + abs(slip[1]) + size * abs(slip[2]), sub(at, vec(c.friction_point))
+    change = (abs(slip[0] - c.start_velocity[1] + c.spin * dot(vec(c.tangents[1]), arm))
+              + abs(slip[1] - c.start_velocity[2] - c.spin * dot(vec(c.tangents[0]), arm))
+              + size * abs(slip[2] - c.spin))
+    return c.persistent != 0 and speed > slow and change < UNSTEADY * speed
+
+
+@compiled
+def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Face,
+               part: tuple[float, float, float], pressed: tuple[float, float],
+               about: tuple[float, float]) -> None:
+    """Set friction points and coefficients of a patch that turns about a point ``about``, given
+    from its center, as the center of pressure ``pressed``; ``part``: the pressed part of its face.
+    """
+    found, size = contacts.found, 0.0
     t, w = vec(found[begin].tangents[0]), vec(found[begin].tangents[1])
-    total = px = py = size = 0.0
     for e in range(begin, end):
-        arm, n = sub(vec(found[e].point), center), found[e].impulse[0]
-        total, px, py = total + n, px + n * dot(t, arm), py + n * dot(w, arm)
-        size = max(size, norm(arm))
-    if total > 0.0:
-        px, py = px / total, py / total
-    share, cx, cy = pressed_part(contacts, count, face, px, py)
-    own = face_moments(contacts, count, face, (x - cx) / share, (y - cy) / share)
+        size = max(size, norm(sub(vec(found[e].point), center)))
+    share, cx, cy = part
+    (px, py), (x, y) = pressed, about
+    own = face_moments(contacts, end - begin, face, (x - cx) / share, (y - cy) / share)
     ox, oy = (px - cx) / share, (py - cy) / share
     jx, jy, mean = resultant_and_moment(face, own, ox, oy)
     resultant, spread = math.sqrt(jx * jx + jy * jy), face[6]
@@ -149,7 +174,7 @@ def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Fac
             # all have one direction; on the line through the center they can be spread, which
             # changes nothing, except that they resist turning if the patch stops
             lengthwise, reach = (jx * ax + jy * ay) / resultant, share * mean / resultant
-            reach += min(spread, reach / (2 * size)) * lengthwise
+            reach += min(share * spread, reach / (2 * size)) * lengthwise
             strength, dx, dy = resultant, jx / resultant, jy / resultant
         else:
             kx, ky, own_mean = resultant_and_moment(face, own, ox + spread * ax, oy + spread * ay)

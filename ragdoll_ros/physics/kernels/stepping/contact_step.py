@@ -90,7 +90,7 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
     step.scalars[0].residual = 0.0
     if m:
         warm_start(s, ws, m, cluster.contacts, h)
-        set_slip_friction(s, ws, kin, step.q_middle, m, True)
+        set_slip_friction(s, ws, kin, step.q_middle, m, h)
         solve_contacts(s, ws, kin, step.q_middle, v, step.v_free, m, h, STEP_TOLERANCE)
         for j in range(len(v)):
             step.v_end[j] = step.v_free[j] + step.v_change[j]

@@ -70,7 +70,7 @@ def impact(s: System, ws: Workspace, cluster: ClusterState) -> int:
     for i in range(m):
         for e in range(5):
             contacts[i].impulse[e] = 0.0
-    set_slip_friction(s, ws, kin, q, m, False)
+    set_slip_friction(s, ws, kin, q, m, 0.0)
     solve_contacts(s, ws, kin, q, v, v, m, 0.0, TOLERANCE)
     for j in range(len(v)):
         v[j] += ws.step.v_change[j]
