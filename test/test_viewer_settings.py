@@ -112,15 +112,15 @@ def test_what_is_said_of_a_scene_is_not_of_the_one_before():
 
 def test_the_accuracy_by_the_dropdown_and_its_price(page):
     wait(lambda: ' ms. Typical error' in page.settings.cost.content)
-    assert '0.6 mm' in page.settings.cost.content
+    assert f'{ERRORS_MM["rigid"]["normal"]:g} mm' in page.settings.cost.content
     page.source.set_engine('bullet')
-    wait(lambda: '5 mm' in page.settings.cost.content)
+    wait(lambda: f'{ERRORS_MM["bullet"]["normal"]} mm' in page.settings.cost.content)
     page.source.set_engine('auto')
     wait(lambda: 'tick' in page.settings.health.figures.content)
     assert GREEN in page.settings.health.dot.content
     page.client.update(page.settings.accuracy, 'exact')
     wait(lambda: page.source.status.accuracy == 'exact')
-    wait(lambda: '0.02 mm' in page.settings.cost.content)
+    wait(lambda: f'{ERRORS_MM["rigid"]["exact"]:g} mm' in page.settings.cost.content)
     assert page.frame.scene is DROP, 'it goes on'
     page.source.load('flight')
     assert page.source.status.accuracy == 'exact'
