@@ -15,7 +15,10 @@ from conserved import conserved
 
 from ragdoll_ros import Push, Simulation, load_scene
 from ragdoll_ros.accuracy.crowds import crowd_digests
-from ragdoll_ros.model.scene import Material, Placement
+from ragdoll_ros.model.ragdoll import Bone, Ragdoll
+from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
+from ragdoll_ros.model.shapes import Sphere
+from ragdoll_ros.physics.accuracy import NORMAL
 
 APART = 2.5
 """m between dolls that never touch."""
@@ -87,6 +90,22 @@ def test_islands_of_a_cluster_move_the_same_to_the_bit_for_any_workers_and_when_
             if len(shown) == 1:
                 engine.restore(snapshot)
     assert shown[0] == shown[1]
+
+
+def test_islands_of_a_cluster_have_all_their_contacts():
+    """Eighty balls that lie side by side, 2 cm apart: each touches the ground."""
+    ball = Ragdoll('ball', (Bone('ball', Sphere(0.1), 2.0, (0, 0, 0)),))
+    balls = tuple(Placement(ball, f'ball_{k}', (0.22 * k, 0.0, 0.1)) for k in range(80))
+    scene = Scene('balls', balls, Ground(), Material(0.5, 0.0, 0.0))
+    accuracy = dataclasses.replace(NORMAL, sleep=False)
+    with Simulation(scene, engine='rigid', accuracy=accuracy) as simulation:
+        for _ in range(3):
+            simulation.advance()
+        assert max(np.bincount(simulation._engine.cluster_of_doll)) > 62
+        contacts = simulation._engine.contacts()
+        assert sorted(contacts.a.tolist()) == list(range(80))
+        assert contacts.forces == pytest.approx(2.0 * 9.8, rel=1e-3)
+        assert simulation._engine.bones_on_ground().all()
 
 
 @pytest.mark.slow

@@ -143,9 +143,13 @@ class Clusters:
         jobs, whole = self._jobs, ~sleeping[self._firsts]
         for cluster in self._multi_doll if duration else ():
             place = self.of_doll[cluster.dolls[0]]
-            if whole[place] and len(cluster.system.tree) > LARGE_CLUSTER and (
+            if not whole[place]:
+                continue
+            if len(cluster.system.tree) > LARGE_CLUSTER and (
                     self._advance_by_islands(cluster, duration, accuracy)):
                 whole[place] = False
+            elif cluster.islands:
+                _invalidate(cluster)
         if not whole.all():
             jobs = jobs[:, whole]
         if self._workers == 1 or jobs.shape[1] < 2:
@@ -348,7 +352,7 @@ class Clusters:
             cluster.state.q[:] = self.q[cluster.q_indices]
             cluster.state.v[:] = self.v[cluster.v_indices]
             left -= window
-        _invalidate(cluster)
+        # Not invalidated before it is advanced itself: an island shares its statistics.
         cluster.state.bone_states[:] = self.bone_states[cluster.bones]
         cluster.state.doll_sums[:] = self.sums[cluster.dolls]
         cluster.state.excluded[:] = np.concatenate(self._excluded(cluster))
