@@ -127,12 +127,13 @@ def look_from_the_front(page, client):
 def test_arrow_keys_push(page, label, axis, sign):
     """A tap of 2000 N: 50 N s of 55 kg. The arrow is there while the push is, and gone after."""
     client = page.open()
-    look_from_the_front(page, client)
+    wait(lambda: page.frame)
     client.press(page, 'Pause or resume')
     wait(lambda: page.source.status.paused)
     client.press(page, 'Reset')
-    # A tap gives what the velocity that the page shows lacks of the top speed.
     wait(lambda: page.frame.time == 0)
+    # Last, as the page shows the home view when it has opened.
+    look_from_the_front(page, client)
     client.press(page, label)
     wait(lambda: page.frame.pushes and page.frame.time == 0)
     assert page.frame.pushes[0].force[axis] == 2000 * sign
