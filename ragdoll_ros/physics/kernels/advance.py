@@ -171,17 +171,18 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)
 
 
-@entry(ADDRESS[::1], REAL, ADDRESS[::1])
-def find_islands(job: np.ndarray, window: float, label: np.ndarray) -> None:
-    """Write to ``label`` (d,) the dolls of a cluster that may meet within ``window`` s: the least
-    index of each island. ``job``: see advance().
+@entry(ADDRESS[::1], REAL[::1], ADDRESS[:, ::1])
+def find_islands(job: np.ndarray, windows: np.ndarray, labels: np.ndarray) -> None:
+    """Write to ``labels`` (k, d) which dolls of a cluster may meet within each of the ``windows``
+    (k,) s: the least index of the island of each doll. ``job``: see advance().
     """
     system, workspace, cluster = vec(job)
     s, ws, state = system_at(system), workspace_at(workspace), cluster_state_at(cluster)
     current = ws.stats[0].gaps_current
     refresh_gaps(s, ws, state)
     ws.stats[0].gaps_current = current
-    label_reachable(s, ws, ws.step.end, ws.gaps, window, label)
+    for k in range(len(windows)):
+        label_reachable(s, ws, ws.step.end, ws.gaps, windows[k], labels[k])
 
 
 @entry(ADDRESS[:, ::1], REAL, REAL, REAL)

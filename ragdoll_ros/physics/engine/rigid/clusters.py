@@ -342,7 +342,7 @@ class Clusters:
             window, label = next_window(np.array(cluster.job(0)), body_counts, left)
             if not window and not made:
                 return False
-            made = self._form_islands(cluster, label if window else np.zeros_like(label), made)
+            made = self._form_islands(cluster, label, made)
             window = window or left
             kernels.advance(np.array([island.job(0) for island in made.values()]), window,
                             accuracy.step, accuracy.flight_error)

@@ -14,22 +14,19 @@ LARGE_CLUSTER, MOST_BODIES = 62, 20
 up to which an island locates as many as one body."""
 
 MOST_HALVINGS = 6
-"""The shortest window is this many times a half of a tick."""
+"""How often the rest of a tick is halved at most to find a window."""
 
 
 def next_window(job: np.ndarray, body_counts: np.ndarray, left: float) -> tuple[float, np.ndarray]:
     """The longest window, ``left`` s halved some times, in which a cluster falls into islands of at
-    most MOST_BODIES, and the island (d,) of each doll; 0 where there is none.
+    most MOST_BODIES, and the island (d,) of each doll; 0 and one island where there is none.
 
     ``job``: of the cluster, see Cluster.job(). ``body_counts`` (d,): bodies of each doll.
     """
-    label = np.zeros(len(body_counts), np.int64)
-
-    def falls_apart(window: float) -> bool:
-        kernels.find_islands(job, window, label)
-        return bool(np.bincount(label, body_counts).max() <= MOST_BODIES)
-
-    windows = [left / 2 ** halvings for halvings in range(MOST_HALVINGS + 1)]
-    if not falls_apart(windows[-1]):
-        return 0.0, label
-    return next(window for window in windows if falls_apart(window)), label
+    windows = left / 2.0 ** np.arange(MOST_HALVINGS + 1)
+    labels = np.zeros((len(windows), len(body_counts)), np.int64)
+    kernels.find_islands(job, windows, labels)
+    for window, label in zip(windows.tolist(), labels, strict=True):
+        if np.bincount(label, body_counts).max() <= MOST_BODIES:
+            return window, label
+    return 0.0, np.zeros_like(labels[0])

@@ -1,6 +1,6 @@
 """Newton's method on a large island, in the space of its degrees of freedom.
 
-The function is that of newton.py, with the same proximal share. Of each contact, linearized, it is
+The function is that of newton.py, with a proximal share too. Of each contact, linearized, it is
 A dp + B du = -phi with du = Y dz + D dp: z = Y^T p, and D the compliance and the proximal share of
 W's diagonal. So dp = -C^-1 (phi + B Y dz) with C = A + B D, a matrix of each contact by itself, and
 
