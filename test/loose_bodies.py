@@ -186,10 +186,18 @@ def stack(count, material, side=0.2, mass=2.0):
 
 
 def brick_wall(columns, courses, material, size=(0.4, 0.2, 0.2), mass=2.0):
-    """Bricks in courses, each course half a brick on from the one below."""
-    piece = box(size, mass, 'brick')
-    return Scene('wall', tuple(
-        Placement(piece, f'brick_{row}_{k}',
-                  (size[0] * (k + 0.5 * (row % 2)), 0, size[2] * (row + 0.5)))
-        for row in range(courses) for k in range(columns)),
-        Ground(), material, gravity=(0, 0, -G))
+    """Bricks in courses, each course half a brick on from the one below, with half bricks at its
+    ends: a whole one would be supported up to just below its center of mass.
+    """
+    whole = box(size, mass, 'brick')
+    half = box((size[0] / 2, *size[1:]), mass / 2, 'half')
+    placements = []
+    for row in range(courses):
+        high = size[2] * (row + 0.5)
+        ends = (0.25, columns - 0.25) if row % 2 else ()
+        placements += [
+            Placement(whole, f'brick_{row}_{k}', (size[0] * (k + (row % 2 + 1) / 2), 0, high))
+            for k in range(columns - row % 2)]
+        placements += [Placement(half, f'half_{row}_{k}', (size[0] * at, 0, high))
+                       for k, at in enumerate(ends)]
+    return Scene('wall', tuple(placements), Ground(), material, gravity=(0, 0, -G))

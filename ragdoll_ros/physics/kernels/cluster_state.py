@@ -14,7 +14,8 @@ CONTACT = np.dtype([
     ('limit_sign', float), ('id', np.int64), ('patch', np.int64), ('island', np.int64),
     ('first_row', np.int64), ('dof_count', np.int64), ('point', float, 3),
     ('friction_point', float, 3), ('normal', float, 3), ('tangents', float, (2, 3)),
-    ('gap', float), ('friction', float), ('rolling_friction', float), ('restitution', float),
+    ('gap', float), ('friction', float), ('patch_share', float),
+    ('rolling_friction', float), ('restitution', float),
     ('normal_velocity', float), ('impulse', float, 5), ('persistent', np.int64),
     ('start_velocity', float, 5), ('spin', float)], align=True)
 """A contact of two bodies (``body_b`` -1: the ground), or a joint at a limit.
@@ -22,7 +23,8 @@ CONTACT = np.dtype([
 kind: see contact_kind.py. dof, limit_sign: of a limit, its degree of freedom and the direction back
 inside. id: the same from step to step; patch: the same for all points of one contact patch. point,
 where the normal force acts, and friction_point, where friction acts: world, m. normal: from b to a;
-tangents: two directions across it. gap: m or rad. rolling_friction: m. normal_velocity: before the
+tangents: two directions across it. gap: m or rad. patch_share: factor on
+friction, see contact/patch_friction.py. rolling_friction: m. normal_velocity: before the
 step, m/s. impulse: along the rows, N s or N m s. persistent: whether it existed as the step began,
 with the velocities start_velocity along its rows and ``spin`` about the normal. island, first_row,
 dof_count: of the solver."""

@@ -105,7 +105,7 @@ def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m:
 
 @compiled
 def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) -> None:
-    """Write tangents and friction points of m contacts, limits excepted, to contacts.found. Those
+    """Write tangents, friction points and patch shares of m contacts, limits excepted, to contacts.found. Those
     of a patch must be adjacent; friction acts nearer to its center than the normal forces.
 
     Under a uniform pressure p, friction against turning about the center has the moment mu times
@@ -122,6 +122,7 @@ def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) 
             c = found[e]
             set_tangents(c)
             put(c.friction_point, vec(c.point))
+            c.patch_share = 1.0
         if end - begin > 2 and patch < len(s.geoms) and s.geoms[patch].kind == CYLINDER:
             contract_to_disc(s.geoms[patch], patch, kin, found, begin, end)
         elif end - begin > 1:

@@ -3,10 +3,11 @@
 A patch that slides and turns has an instantaneous center. Where the friction of its points adds up
 to the share j of mu times the normal force, and has the mean lever arm m about the center, it is
 that of one point in whose direction it pulls, m / j from the center, with a coefficient of j mu:
-only there is the slip in line with it. Contacts get such points, and coefficients, that with their
-normal impulses of the last step the friction of the patch is exact. Where its slip changes fast,
-the friction points of find_contacts.set_friction_points() are moved so that their center is that of
-pressure; where it sticks, they stay.
+only there is the slip in line with it. Contacts get such points, and such shares j, that with their
+normal impulses the friction of the patch is exact. Those are known only after the step, which is
+therefore solved again where they differ. Where the slip changes fast, the friction points of
+find_contacts.set_friction_points() are moved so that their center is that of pressure; where it
+sticks, they stay.
 """
 from __future__ import annotations
 
@@ -43,25 +44,31 @@ POINTLIKE = 0.25
 """Share of a face below which its pressed part is as good as a point, about which it may pivot: its
 contacts could not represent more."""
 
+MOVED = 1e-3
+"""Change of a friction point, over the size of the patch, or of its share, that is worth a new
+solve."""
+
 LONGEST = 4.0
 """Longest lever arm of a contact's friction, over the size of the patch."""
 
 
 @compiled
 def set_slip_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, m: int,
-                      h: float) -> None:
-    """Set friction points and coefficients of the patches among m found contacts, where friction
-    has a limit, for the velocities of ``kin``, which is that of q, over a step of h s, after
-    warm_start(); start_velocity becomes that of the new points. h = 0: an impact.
+                      h: float) -> bool:
+    """Set friction points and shares of the patches among m found contacts, where friction has a
+    limit, for their impulses and the velocities of ``kin``, which is that of q, over a step of h s,
+    after warm_start(); start_velocity becomes that of the new points. h = 0: an impact. Returns
+    whether any has changed by more than MOVED.
     """
-    found, begin = ws.contacts.found, 0
+    found, begin, changed = ws.contacts.found, 0, False
     while begin < m:
         end = patch_end(found, begin, m)
         if end - begin > 1 and found[begin].kind != LIMIT:
             known = known_contact(found, begin, end, h > 0)
             if known >= 0:
-                spread_over_patch(s, ws, kin, q, begin, end, known, h)
+                changed |= spread_over_patch(s, ws, kin, q, begin, end, known, h)
         begin = end
+    return changed
 
 
 @compiled
@@ -99,9 +106,9 @@ def slip_at(s: System, kin: Kinematics, q: np.ndarray, c: np.record,
 
 @compiled
 def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, begin: int,
-                      end: int, known: int, h: float) -> None:
-    """Set friction points and coefficients of contacts begin to end - 1, a patch, with the known
-    contact known_contact(), over a step of h s.
+                      end: int, known: int, h: float) -> bool:
+    """Set friction points and shares of contacts begin to end - 1, a patch, with the known contact
+    known_contact(), over a step of h s. Returns whether any has changed by more than MOVED.
     """
     found, total, count = ws.contacts.found, 0.0, end - begin
     middle = pressed = mean = (0.0, 0.0, 0.0)
@@ -116,7 +123,7 @@ def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
     size = norm(sub(vec(found[begin].point), vec(found[end - 1].point))) / 2
     a, b, turn = slip_at(s, kin, q, found[known], pressed if total > 0.0 else middle)
     if not abs(a) + abs(b) + size * abs(turn) > STILL:
-        return
+        return False
     if math.sqrt(a * a + b * b) < FAR * size * abs(turn):
         center, face = measure_face(s, ws.contacts, kin, begin, end, middle)
         if not total > 0.0:
@@ -127,13 +134,15 @@ def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
         slow = h * found[known].friction * norm(vec(s.gravity))
         if part[0] > POINTLIKE and (h == 0.0 or is_steady(
                 found[known], pressed, slip, part[0] * size, slow)):
-            turn_about(ws.contacts, begin, end, center, face, part, (x, y),
-                       (x - slip[1] / slip[2], y + slip[0] / slip[2]))
-            return
+            return turn_about(ws.contacts, begin, end, center, face, part, (x, y),
+                              (x - slip[1] / slip[2], y + slip[0] / slip[2]))
+    changed = False
     if total > 0.0:
         for e in range(begin, end):
             c = found[e]
-            set_friction(c, add(vec(c.friction_point), sub(pressed, mean)), 1.0)
+            changed |= set_friction(c, add(vec(c.friction_point), sub(pressed, mean)),
+                                    c.patch_share, size)
+    return changed
 
 
 @compiled
@@ -153,11 +162,12 @@ def is_steady(c: np.record, at: Vec3, slip: tuple[float, float, float], size: fl
 @compiled
 def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Face,
                part: tuple[float, float, float], pressed: tuple[float, float],
-               about: tuple[float, float]) -> None:
-    """Set friction points and coefficients of a patch that turns about a point ``about``, given
-    from its center, as the center of pressure ``pressed``; ``part``: the pressed part of its face.
+               about: tuple[float, float]) -> bool:
+    """Set friction points and shares of a patch that turns about a point ``about``, given from its
+    center, as the center of pressure ``pressed``; ``part``: the pressed part of its face. Returns
+    whether any has changed by more than MOVED.
     """
-    found, size = contacts.found, 0.0
+    found, size, changed = contacts.found, 0.0, False
     t, w = vec(found[begin].tangents[0]), vec(found[begin].tangents[1])
     for e in range(begin, end):
         size = max(size, norm(sub(vec(found[e].point), center)))
@@ -185,16 +195,19 @@ def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Fac
             reach = min(share * own_mean / strength, LONGEST * size)
             strength = share * own_mean / reach if reach > 0.0 else strength
         at = add_scaled(add_scaled(center, x + reach * dx, t), y + reach * dy, w)
-        set_friction(found[e], at, strength)
+        changed |= set_friction(found[e], at, strength, size)
+    return changed
 
 
 @compiled
-def set_friction(c: np.record, at: Vec3, strength: float) -> None:
-    """Move the friction of contact c to the point ``at``, with its velocity at the step's start,
-    and multiply its coefficient.
+def set_friction(c: np.record, at: Vec3, share: float, size: float) -> bool:
+    """Move the friction of contact c, of a patch of this ``size``, m, to the point ``at``, with its
+    velocity at the step's start, and set its share. Returns whether that is a change by more than
+    MOVED.
     """
-    moved = sub(at, vec(c.friction_point))
+    moved, before = sub(at, vec(c.friction_point)), c.patch_share
     c.start_velocity[1] -= c.spin * dot(vec(c.tangents[1]), moved)
     c.start_velocity[2] += c.spin * dot(vec(c.tangents[0]), moved)
     put(c.friction_point, at)
-    c.friction *= strength
+    c.patch_share = share
+    return norm(moved) > MOVED * size or abs(share - before) > MOVED

@@ -106,7 +106,8 @@ def collect_island(ws: Workspace, begin: int, m: int, number: int) -> tuple[int,
         c.first_row = rows
         member = ws.island.members[count]
         member.contact, member.kind, member.row = i, c.kind, rows
-        member.friction, member.rolling_friction = c.friction, c.rolling_friction
+        member.friction, member.rolling_friction = (
+            c.patch_share * c.friction, c.rolling_friction)
         rows += c.kind
         count += 1
     return count, rows

@@ -90,10 +90,17 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
     step.scalars[0].residual = 0.0
     if m:
         warm_start(s, ws, m, cluster.contacts, h)
-        set_slip_friction(s, ws, kin, step.q_middle, m, h)
-        solve_contacts(s, ws, kin, step.q_middle, v, step.v_free, m, h, STEP_TOLERANCE)
-        for j in range(len(v)):
-            step.v_end[j] = step.v_free[j] + step.v_change[j]
+        slips = set_slip_friction(s, ws, kin, step.q_middle, m, h)
+        for turn in range(2 if slips else 1):
+            if turn:
+                for j in range(len(v)):
+                    step.v_middle[j] = (v[j] + step.v_end[j]) / 2
+                update_velocities(s.tree, step.q_middle, step.v_middle, kin)
+                if not set_slip_friction(s, ws, kin, step.q_middle, m, h):
+                    break
+            solve_contacts(s, ws, kin, step.q_middle, v, step.v_free, m, h, STEP_TOLERANCE)
+            for j in range(len(v)):
+                step.v_end[j] = step.v_free[j] + step.v_change[j]
     else:
         for j in range(len(v)):
             step.v_end[j], step.correction[j] = step.v_free[j], 0.0
