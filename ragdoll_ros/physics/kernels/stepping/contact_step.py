@@ -61,11 +61,15 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def approaches_fast(ws: Workspace, cluster: ClusterState) -> bool:
-    """Whether a contact at the start of a step that was open in the last one closes so fast that
-    it is an impact: geoms that met as that ended, or points of a patch that it made penetrate.
+    """Whether a contact at the start of a step that was open in the last one closes so fast that it
+    is an impact: after an impact what had no part in it; after a step points of bodies that it
+    made penetrate, whose gap was that of their nearest points. Others closed too slowly in it.
     """
+    after_step = ws.stats[0].ended_without_impact != 0
     for i in range(ws.step.scalars[0].start_contact_count):
         c = ws.contacts.start[i]
+        if after_step and c.body_b < 0:
+            continue
         if is_approaching(c) and not (
                 had_met(cluster.contacts, ws.stats[0].contact_count, c.id)):
             return True
