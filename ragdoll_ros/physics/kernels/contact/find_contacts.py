@@ -188,8 +188,8 @@ def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
 
 @compiled
 def had_met(contacts: np.ndarray, count: int, id_: int) -> bool:
-    """Whether the contact with this id is among ``count`` of the last step, nearer than MET. Not
-    whether it pressed: of redundant contacts rounding decides that.
+    """Whether the contact with this id was one of the ``count`` of the last step and nearer than
+    MET, or pressed. That it pressed would not do alone: of redundant contacts rounding decides it.
     """
     j = find_id(contacts, count, id_, 0)
-    return j < count and contacts[j].gap <= MET
+    return j < count and (contacts[j].gap <= MET or contacts[j].impulse[0] > 0)
