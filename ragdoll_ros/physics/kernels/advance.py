@@ -157,7 +157,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
                 refresh_gaps(s, ws, cluster)
             h = left / max(1, math.ceil(left / nominal - 1e-9))
             begin_contact_step(s, ws, cluster)
-            gone, touched = 0.0, seek and impact_due and approaches_fast(ws, cluster)
+            gone, touched = 0.0, seek and impact_due and approaches_fast(s, ws, cluster)
             if not touched:
                 gone, touched = step_to_impact(s, ws, cluster, h, time, nominal, seek)
             dense.first_rate_known, dense.next_length = 0, 0.0

@@ -187,9 +187,23 @@ def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
 
 
 @compiled
-def had_met(contacts: np.ndarray, count: int, id_: int) -> bool:
-    """Whether the contact with this id was one of the ``count`` of the last step and nearer than
-    MET, or pressed. That it pressed would not do alone: of redundant contacts rounding decides it.
+def had_met(s: System, contacts: np.ndarray, count: int, id_: int) -> bool:
+    """Whether the contact with this id was one of the ``count`` of the last step, and nearer than
+    MET or of dolls that pressed on each other, or on the ground or at limits. Not whether it
+    pressed itself: of redundant contacts rounding decides that.
     """
     j = find_id(contacts, count, id_, 0)
-    return j < count and (contacts[j].gap <= MET or contacts[j].impulse[0] > 0)
+    if j == count or contacts[j].gap <= MET:
+        return j < count
+    for k in range(count):
+        if contacts[k].impulse[0] > 0 and (
+                doll_of(s, contacts[k].body_a) == doll_of(s, contacts[j].body_a)) and (
+                doll_of(s, contacts[k].body_b) == doll_of(s, contacts[j].body_b)):
+            return True
+    return False
+
+
+@compiled
+def doll_of(s: System, body: int) -> int:
+    """Index of a body's doll, -1 of the ground's."""
+    return s.body_doll[body] if body >= 0 else -1

@@ -60,7 +60,7 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 
 @compiled
-def approaches_fast(ws: Workspace, cluster: ClusterState) -> bool:
+def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
     """Whether a contact at the start of a step that was open in the last one closes so fast that it
     is an impact: after an impact what had no part in it; after a step points of bodies that it
     made penetrate, whose gap was that of their nearest points. Others closed too slowly in it.
@@ -71,7 +71,7 @@ def approaches_fast(ws: Workspace, cluster: ClusterState) -> bool:
         if after_step and c.body_b < 0:
             continue
         if is_approaching(c) and not (
-                had_met(cluster.contacts, ws.stats[0].contact_count, c.id)):
+                had_met(s, cluster.contacts, ws.stats[0].contact_count, c.id)):
             return True
     return False
 

@@ -43,7 +43,7 @@ def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m
         if contacts[i].gap > MET:
             contact_velocities(s, kin, cluster.q, cluster.v, contacts[i])
             if not is_approaching(contacts[i]) and not (
-                    had_met(cluster.contacts, known, contacts[i].id)):
+                    had_met(s, cluster.contacts, known, contacts[i].id)):
                 continue
         contacts[count] = contacts[i]
         count += 1
