@@ -105,8 +105,9 @@ def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m:
 
 @compiled
 def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) -> None:
-    """Write tangents, friction points and patch shares of m contacts, limits excepted, to contacts.found. Those
-    of a patch must be adjacent; friction acts nearer to its center than the normal forces.
+    """Write tangents, friction points and patch shares of m contacts, limits excepted, to
+    contacts.found. Those of a patch must be adjacent; friction acts nearer to its center than the
+    normal forces.
 
     Under a uniform pressure p, friction against turning about the center has the moment mu times
     the integral of p times the distance: its lever arm is the mean distance over the patch, not

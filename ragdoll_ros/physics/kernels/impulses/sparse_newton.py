@@ -24,13 +24,16 @@ from ..workspace import Island, Workspace
 from .one_contact import project_to_disc
 
 SPARSE_STEPS, SPARSE_PATIENCE = 12, 4
-"""Newton steps at most, and those that do not halve the residual. All are taken in full: it may
-grow on the way, as contacts change between sticking and sliding. The best is kept."""
+"""Newton steps at most, and those in vain: without these halvings, contacts that change between
+sticking and sliding let the steps cycle."""
 
-MOST_PROXIMAL, LEAST_PROXIMAL = 1e-3, 1e-6
-"""Share of W's diagonal that resists the steps: at first, and a tenth after each that halves the
-residual, as what is left is what the impulses of several bodies decide together. In heaps less at
-first lets the steps cycle; ten times as much takes three times as many."""
+HALVED_SHARES = 4
+"""Shares of a step that are tried, each half of the one before."""
+
+FIRST_PROXIMAL, LEAST_PROXIMAL, MOST_PROXIMAL = 1e-3, 1e-6, 0.1
+"""Share of the diagonal of W that resists a step: of the first one, a tenth of it after each whole
+step, as what is left is what the impulses of several bodies decide together, and ten times as much
+after a step in vain."""
 
 
 @compiled
@@ -262,9 +265,8 @@ def solve_for_z(island: Island, dofs: int) -> bool:
 
 
 @compiled
-def take_step(ws: Workspace, m: int, p: np.ndarray) -> None:
-    """Add dp = -C^-1 (phi + B Y dz) to p (n,); dz: island.z_direction, by places."""
-    island = ws.island
+def find_direction(island: Island, m: int) -> None:
+    """Write dp = -C^-1 (phi + B Y dz) to island.direction; dz: island.z_direction, by places."""
     for k in range(m):
         member, B, phi = island.members[k], island.B[k], island.phi[k]
         slide = island.local
@@ -276,43 +278,68 @@ def take_step(ws: Workspace, m: int, p: np.ndarray) -> None:
             change = phi[e]
             for g in range(member.kind):
                 change += B[e, g] * slide[g]
-            p[member.row + e] -= change
+            island.direction[member.row + e] = -change
+
+
+@compiled
+def linearize(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray,
+              proximal: float) -> tuple[float, float]:
+    """Linearize m contacts at p. Returns the largest entry of phi, m/s, and the sum of squares."""
+    write_velocities(ws, m, b, p)
+    worst = total = 0.0
+    for k in range(m):
+        worst = max(worst, linearize_contact(ws.island, k, p, proximal))
+        for e in range(ws.island.members[k].kind):
+            total += ws.island.phi[k, e] * ws.island.phi[k, e]
+    return worst, total
+
+
+@compiled
+def take_step(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, proximal: float,
+              total: float) -> float:
+    """Move p along island.direction, by the first of HALVED_SHARES that reduces phi's sum of
+    squares, ``total``, by half as much as a linear function. Returns the share; 0 if none does.
+    """
+    start, direction, share = ws.island.best, ws.island.direction, 1.0
+    for i in range(n):
+        start[i] = p[i]
+    for _ in range(HALVED_SHARES):
+        for i in range(n):
+            p[i] = start[i] + share * direction[i]
+        if linearize(ws, m, b, p, proximal)[1] < (1 - share / 2) * total:
+            return share
+        share /= 2
+    for i in range(n):
+        p[i] = start[i]
+    return 0.0
 
 
 @compiled
 def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
                   dofs: int) -> float:
-    """Take Newton steps from p, which becomes the best found. Returns its residual, m/s; island.z
-    becomes Y^T p. ``dofs``: from find_sparsity().
+    """Take Newton steps from p, in place. Returns the residual, m/s; island.z becomes Y^T p.
+    ``dofs``: from find_sparsity().
     """
-    island, keep = ws.island, ws.island.best
-    best, late, proximal, before = math.inf, 0, MOST_PROXIMAL, math.inf
+    island, late, proximal, worst = ws.island, 0, FIRST_PROXIMAL, math.inf
     for turn in range(SPARSE_STEPS + 1):
-        write_velocities(ws, m, b, p)
-        worst = 0.0
-        for k in range(m):
-            worst = max(worst, linearize_contact(island, k, p, proximal))
-        late = 0 if worst < best / 2 else late + 1
-        proximal = max(LEAST_PROXIMAL, proximal / 10) if worst < before / 2 else MOST_PROXIMAL
-        before = worst
-        if worst < best:
-            best = worst
-            for i in range(n):
-                keep[i] = p[i]
-        if best <= tolerance or late > SPARSE_PATIENCE or turn == SPARSE_STEPS:
+        worst, total = linearize(ws, m, b, p, proximal)
+        if worst <= tolerance or late > SPARSE_PATIENCE or turn == SPARSE_STEPS:
             break
         for k in range(m):
             eliminate_contact(island, k)
             multiply_rows(island, k)
         if not solve_for_z(island, dofs):
             break
-        take_step(ws, m, p)
-    for i in range(n):
-        p[i] = keep[i]
+        find_direction(island, m)
+        share = take_step(ws, m, n, b, p, proximal, total)
+        if share == 0.0:
+            proximal, late = min(10 * proximal, MOST_PROXIMAL), late + 1
+        elif share == 1.0:
+            proximal = max(LEAST_PROXIMAL, proximal / 10)
     for k in range(m):
         project_member(island, k, p)
     write_velocities(ws, m, b, p)
-    return best
+    return worst
 
 
 @compiled

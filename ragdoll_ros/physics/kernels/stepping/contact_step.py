@@ -22,6 +22,7 @@ from ..dynamics.kinematics import (forward_kinematics, integrate_positions, plac
                                    root_motion_subspaces, rotate_inertias, update_velocities)
 from ..dynamics.mass_matrix import factor_ltl, mass_matrix, solve_lower, solve_upper
 from ..impulses.solve_contacts import solve_contacts
+from ..impulses.solver import UNSOLVED
 from ..system import NO_SLIP, System
 from ..workspace import Workspace
 from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
@@ -97,6 +98,8 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
         slips = set_slip_friction(s, ws, kin, step.q_middle, m, h)
         for turn in range(2 if slips else 1):
             if turn:
+                if step.scalars[0].residual > UNSOLVED:
+                    break
                 for j in range(len(v)):
                     step.v_middle[j] = (v[j] + step.v_end[j]) / 2
                 update_velocities(s.tree, step.q_middle, step.v_middle, kin)
