@@ -93,9 +93,11 @@ setup(
         'replay': ['mcap'],
         'falls': ['pyarrow', 'mcap-ros2-support', 'matplotlib'],
         'ray': ['ray'],
+        # axe-playwright-python ships axe-core, the usual audit of a page for all users.
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy', 'rosbags',
-                 'pandas', 'playwright', 'pygltflib', 'bvhio', 'nbclient', 'nbformat', 'ipykernel',
-                 'mypy', 'rtree', 'mannequin-x; python_version >= "3.11"'],
+                 'pandas', 'playwright', 'axe-playwright-python', 'pygltflib', 'bvhio',
+                 'nbclient', 'nbformat', 'ipykernel', 'mypy', 'rtree',
+                 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],
     },

@@ -19,6 +19,7 @@ from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.fit.skin import skin_of
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import Ground, Placement, Scene, above_ground
+from ragdoll_ros.viewer.drawing.joint_balls import joint_balls
 from ragdoll_ros.viewer.drawing.meshes import MESHES
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 
@@ -160,6 +161,7 @@ class Seen:
 def surfaces(frame, skins):
     """Points (v, 3) m and triangles (f, 3) of what a frame shows; ``skins``: where there are."""
     scene, state = frame.scene, frame.state
+    skinned = set()
     for placement, part in zip(scene.dolls, scene.bone_slices, strict=True):
         skin = skin_of(placement.doll) if skins else None
         own = state.poses(slice(part.start, part.stop))
@@ -167,6 +169,7 @@ def surfaces(frame, skins):
             pose = dataclasses.make_dataclass('Pose', ['positions', 'orientations'])(
                 own.position, own.orientation)
             yield posed(skin, pose), skin.triangles
+            skinned.update(range(part.start, part.stop))
             continue
         for bone, position, orientation in zip(scene.bones[part], own.position, own.orientation,
                                                strict=True):
@@ -175,6 +178,10 @@ def surfaces(frame, skins):
                 points = rotation.rotate(np.array(piece.orientation),
                                          vertices * np.array(piece.size)) + piece.position
                 yield position + rotation.rotate(orientation, points), faces
+    for bone, _, ball in joint_balls(scene):
+        if bone not in skinned:
+            vertices, faces = MESHES[ball.kind]
+            yield state.poses(bone).apply(ball.position + vertices * np.array(ball.size)), faces
 
 
 def test_a_plain_skin_after_a_painted_one_is_seen(seen, scenes, tmp_path):

@@ -33,8 +33,11 @@ PERIOD = 1 / 60
 IDLE_PERIOD = 0.1
 """s between two checks for an open page."""
 
-SIMULATION_HINT = ('Drag a bone. Arrow keys push, tap or hold; a click on a bone chooses which. '
-                   'Space pauses, R resets, E edits, H shows the home view.')
+SIMULATION_HINT = ('<span class="ragdoll-mouse">Drag a bone. Arrow keys push, tap or hold; a click '
+                   'on a bone chooses which. Space pauses, R resets, E edits, H shows the home '
+                   'view.</span><span class="ragdoll-touch">Drag a bone with one finger. The '
+                   'arrows below push; a tap on a bone chooses which. Two fingers move the view.'
+                   '</span>')
 RECORDING_HINT = ('A recorded run. Space pauses, R restarts, drag Time or press J, K, L to look '
                   'back, H shows the home view.')
 
@@ -60,11 +63,12 @@ class Page:
         configure_theme(server, dark=False)
         server.gui.main_panel.dock_right()
         is_simulated = source.recording is None
-        for html in (style('panel.css'), script('panel_layout.js'),
+        for html in (style('panel.css'), style('controls.css'), script('panel_layout.js'),
+                     script('title.js', TITLE='Ragdoll'), script('accessibility.js'),
                      hint(SIMULATION_HINT, 'ragdollHint') if is_simulated
                      else hint(RECORDING_HINT, 'ragdollRecordingHint'),
                      style('disconnected_banner.css', message=DISCONNECTED),
-                     script('null_node_guard.js'), script('materials.js'),
+                     script('null_node_guard.js'), script('materials.js'), script('look.js'),
                      script('hide_drag_arrow.js'), script('handle_picking.js', ROOT=ROOT),
                      script('upload_notices.js'), script('decimal_comma.js')):
             server.gui.add_html(html)

@@ -49,7 +49,9 @@ def static_html(recording: Recording) -> str:
             serializer.insert_sleep(1 / RATE)
             stage.show(playback.frame_at(float(time)))
         head, end, tail = serializer.as_html().rpartition('</body>')
-        return f'{head}<script>{source("materials.js")}</script>{end}{tail}'
+        scripts = ''.join(f'<script>{source(name)}</script>'
+                          for name in ('look.js', 'materials.js'))
+        return f'{head}{scripts}{end}{tail}'
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()

@@ -1,6 +1,8 @@
 // Sends which arrow keys are down, every 0.1 s while any is: a page may vanish without a word.
 // Arrow keys and E are kept from viser's camera, which would move with them; hotkeys still get E.
 // A clicked button or checkbox gives up the focus, or it would take the next Space or arrow key.
+// What has the focus by the Tab key keeps the keys that it uses: arrows move a slider and push
+// nothing, Space presses a button and does not pause.
 function listen(send) {
   const down = new Set();
   const sendAll = () => send([...down].join(' '));
@@ -10,10 +12,14 @@ function listen(send) {
     const key = event.key.replace('Arrow', '').toLowerCase();
     const arrow = event.key.startsWith('Arrow');
     if (arrow || key === 'e') event.stopPropagation();
-    if (!arrow || event.target.matches('input, textarea, select')
+    if (!arrow || event.target.matches('input, textarea, select, [role=slider], [role=tab]')
         || event.ctrlKey || event.altKey || event.metaKey || down.has(key)) return;
     down.add(key);
     sendAll();
+  });
+  document.body.addEventListener('keydown', (event) => {
+    if ((event.key === ' ' || event.key === 'Enter') && event.target.matches(
+        'button, a, summary, [role=button], [role=tab], [role=slider]')) event.stopPropagation();
   });
   root.addEventListener('keyup', (event) => {
     if (down.delete(event.key.replace('Arrow', '').toLowerCase())) sendAll();

@@ -90,7 +90,7 @@ class Bodies:
         handle = self._server.scene.add_batched_meshes_simple(
             name, *self._meshes[kind], wxyzs, positions,
             batched_scales=np.array([part.size for part in parts]),
-            batched_colors=np.round(colors * 255).astype(np.uint8), lod='off')
+            batched_colors=np.round(linear(colors) * 255).astype(np.uint8), lod='off')
         return Batch(kind, skinned, handle, bones, local_pose)
 
     def show(self, state: State) -> None:
@@ -106,6 +106,11 @@ class Bodies:
             if batch.skinned:
                 batch.handle.visible = visible
                 batch.handle.opacity = OPACITY if translucent else None
+
+
+def linear(colors: np.ndarray) -> np.ndarray:
+    """Light of colours in sRGB, 0 to 1: what viser takes the colours of batches for."""
+    return np.where(colors > 0.04045, ((colors + 0.055) / 1.055) ** 2.4, colors / 12.92)
 
 
 def _part_poses(state: State, bones: np.ndarray,

@@ -1,6 +1,8 @@
 """Cameras of the pages: the home view, which shows the whole scene, and following a doll."""
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 import viser
 
@@ -15,14 +17,17 @@ PERIOD = 1 / 30
 INITIAL_CAMERA = ((3.2, -0.9, 1.3), (0.0, 0.0, 0.7))
 """Position and target before the first frame, m: from the front, a little aside."""
 
-FIELD_OF_VIEW = 0.8
-"""rad, vertical."""
+FIELD_OF_VIEW = 0.7
+"""rad, vertical: that of a lens of 33 mm on 35 mm film, which enlarges nothing that is near."""
 
 FAR = 1000.0
 """m: smallest far plane."""
 
 MAX_DISTANCE_RATIO = 4
 """A camera farther away than this times the distance of the home view is moved to that."""
+
+MOST_HOMES = 4
+"""Home views of a page that are remembered: a window changes its size in several steps."""
 
 TOLERANCE = 1e-3
 """m within which a camera counts as being in the home view."""
@@ -49,8 +54,10 @@ class Cameras:
         self._doll = server.scene.add_frame(DOLL_NODE, show_axes=False)
         self._bone = 0
         """Index of the pushed bone."""
-        self._homes: dict[int, tuple[np.ndarray, float]] = {}
-        """Position of each page's home view, and the aspect it was computed for."""
+        self._homes: dict[int, deque[np.ndarray]] = {}
+        """Positions of each page's last home views: a page tells of its place before the last."""
+        self._home_aspects: dict[int, float] = {}
+        """That the last one was computed for."""
         self._before_follow: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         """Position and target of each page's camera before it followed."""
         self._next_move = 0.0
@@ -84,7 +91,8 @@ class Cameras:
         if self._node is not None:  # its position may be of the scene before
             self._node.position = look_at = self._center(self._frame)
         position = home_position(*spheres, look_at, camera.fov, _aspect(camera))
-        self._homes[client.client_id] = position, _aspect(camera)
+        self._homes.setdefault(client.client_id, deque(maxlen=MOST_HOMES)).append(position)
+        self._home_aspects[client.client_id] = _aspect(camera)
         camera.up_direction = (0.0, 0.0, 1.0)
         self._move(client, position, look_at)
         camera.far = max(FAR, 3 * float(np.linalg.norm(position - look_at)))
@@ -122,10 +130,11 @@ class Cameras:
 
         @client.camera.on_update
         def _(camera: viser.CameraHandle) -> None:
-            position, aspect = self._homes.get(client.client_id, (np.full(3, np.inf), 1.0))
+            homes = self._homes.get(client.client_id, ())
+            aspect = self._home_aspects.get(client.client_id, 1.0)
             resized = abs(_aspect(camera) / aspect - 1) > 0.01
             if _is_at(camera, self._server.initial_camera.position) or (
-                    resized and _is_at(camera, position)):
+                    resized and any(_is_at(camera, position) for position in homes)):
                 self.go_home(client)
 
     def _ensure_visible(self, client: viser.ClientHandle) -> None:

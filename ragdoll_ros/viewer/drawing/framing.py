@@ -14,10 +14,10 @@ import numpy as np
 from ...model.scene import Scene
 from ...model.state import State
 
-VIEW_DIRECTION = np.array((3.2, -0.9, 0.6))
+VIEW_DIRECTION = np.array((3.2, -0.9, 0.75))
 """From the target towards the camera, any length: from the front, as the arrow keys assume."""
 
-MARGIN = 1.3
+MARGIN = 1.15
 """Factor of the smallest distance."""
 
 MIN_DISTANCE = 2.5

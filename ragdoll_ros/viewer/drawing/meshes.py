@@ -1,7 +1,7 @@
 """Unit meshes, to be scaled: a box, a cylinder along z, a sphere.
 
 Vertices (v, 3) m and faces (f, 3), counter-clockwise seen from outside. Shading uses vertex
-normals, so sharp edges have separate vertices for each face.
+normals, so sharp edges have separate vertices for each face, and soft ones share them.
 """
 from __future__ import annotations
 
@@ -12,9 +12,13 @@ Mesh = tuple[np.ndarray, np.ndarray]
 SEGMENTS = 24
 """Of a circle."""
 
+EDGE = 0.06
+"""Width of the strip along a box's edges, relative to its size, that is shaded as if it were round.
+Its corners share their vertices, and thereby normals; the shape remains a box."""
+
 
 def box() -> Mesh:
-    """A box with edges of 1 m."""
+    """A box with edges of 1 m, of flat faces."""
     corners, faces = [], []
     for axis in range(3):
         u, w = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
@@ -24,6 +28,25 @@ def box() -> Mesh:
                         for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
             faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
     return np.array(corners), np.array(faces)
+
+
+def soft_box() -> Mesh:
+    """A box with edges of 1 m that are shaded as round."""
+    corners, _ = box()
+    outer, shared = np.unique(corners, axis=0, return_inverse=True)
+    inner = corners.copy()
+    faces = []
+    for first in range(0, 24, 4):
+        axis = int(np.argmin(np.ptp(corners[first:first + 4], axis=0)))
+        inside = np.delete(np.arange(3), axis)
+        inner[first:first + 4, inside] *= 1 - 2 * EDGE
+        at = np.arange(first, first + 4) + len(outer)
+        edge = shared.ravel()[first:first + 4]
+        faces += [(at[0], at[1], at[2]), (at[0], at[2], at[3])]
+        for k in range(4):
+            after = (k + 1) % 4
+            faces += [(edge[k], edge[after], at[after]), (edge[k], at[after], at[k])]
+    return np.concatenate([outer, inner]), np.array(faces)
 
 
 def cylinder(corners: int = SEGMENTS) -> Mesh:
@@ -56,8 +79,8 @@ def sphere(corners: int = SEGMENTS) -> Mesh:
     return points.reshape(-1, 3), faces
 
 
-MESHES = {'box': box(), 'cylinder': cylinder(), 'sphere': sphere()}
+MESHES = {'box': soft_box(), 'cylinder': cylinder(), 'sphere': sphere()}
 """By the kinds of primitives in model.shapes."""
 
-COARSE = {**MESHES, 'cylinder': cylinder(SEGMENTS // 2), 'sphere': sphere(SEGMENTS // 2)}
+COARSE = {'box': box(), 'cylinder': cylinder(SEGMENTS // 2), 'sphere': sphere(SEGMENTS // 2)}
 """For crowds, whose heads are most of the triangles: a quarter of these."""

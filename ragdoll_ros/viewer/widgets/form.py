@@ -20,7 +20,7 @@ from .error_text import field_error
 NUMBERS = ('number', 'vector')
 """Widgets of one number and of three; both are text fields."""
 
-RED, AMBER, GREEN, GREY = '#c92a2a', '#b35900', '#2b8a3e', '#495057'
+RED, AMBER, GREEN, GREY = (f'var(--ragdoll-{name})' for name in ('red', 'amber', 'green', 'grey'))
 
 
 FieldValue = str | float | tuple[float, ...]
