@@ -132,3 +132,66 @@ def test_what_is_typed_while_a_value_is_applied_stays(view):
     assert mass.input_value() == '4.25'
     view.press(f'Undo: numbers of {BONE}')
     view.wait(lambda: float(mass.input_value()) == SCENE.bones[SCENE.bone_index(BONE)].mass)
+
+
+def banner(view):
+    return view.page.locator('.ragdoll-edit-banner')
+
+
+def mode(view):
+    """What the banner says that handles do."""
+    return banner(view).locator('[aria-pressed=true]').text_content().split()[0]
+
+
+def run(view):
+    """End editing, and go back to the start."""
+    view.key(' ')
+    banner(view).wait_for(state='detached')
+    view.tab('Play')
+    view.hold_at(SCENE, START)
+
+
+def test_e_edits_and_w_e_r_choose_what_handles_do(view):
+    """E opens the tab and starts editing, which a banner says; there it turns."""
+    view.tab('Play')
+    view.page.mouse.click(20, 700)
+    view.key('e')
+    banner(view).wait_for()
+    view.button('Run').first.wait_for()
+    assert mode(view) == 'Move'
+    for key, name in (('e', 'Turn'), ('r', 'Size'), ('w', 'Move'), ('e', 'Turn')):
+        view.key(key)
+        view.wait(lambda name=name: mode(view) == name)
+    banner(view).get_by_role('button', name='Size').click()
+    view.wait(lambda: mode(view) == 'Size')
+    run(view)
+
+
+def test_keys_mean_no_two_things(view):
+    """In a field E is a letter; where the tab is closed E opens it, R resets and W flies."""
+    view.tab('Play')
+    view.page.mouse.click(20, 700)
+    view.key('e')
+    banner(view).wait_for()
+    view.key('w')
+    view.wait(lambda: mode(view) == 'Move')
+    choose(view, BONE)
+    view.field('mass, kg').fill('')
+    view.page.keyboard.type('5e0')
+    assert view.field('mass, kg').input_value() == '5e0'
+    view.page.mouse.click(20, 700)
+    view.tab('Play')
+    view.page.mouse.click(20, 700)
+    before = view.pixels(START)
+    view.key('r')
+    view.page.keyboard.down('w')
+    view.wait(lambda: abs(view.pixels(START) - before).max() > 5)
+    view.page.keyboard.up('w')
+    view.key('e')
+    view.button('Run').first.wait_for()
+    assert mode(view) == 'Move'
+    banner(view).get_by_role('button', name='Run').click()
+    banner(view).wait_for(state='detached')
+    view.wait(lambda: abs(view.bodies(SCENE) - START).max() > 0.01)
+    view.tab('Play')
+    view.hold_at(SCENE, START)

@@ -17,9 +17,10 @@ from ..viser_internals import handle_id
 from ..widgets.error_text import error_text
 from ..widgets.form import FormValues
 from . import bone_form, changes, mirror
+from .banner import MODES, Banner
 from .edited_scene import EditedScene, Reason
 from .files_panel import FilesPanel
-from .handles import Handles
+from .handles.body_handles import BodyHandles, Mode
 from .panel import EditorPanel
 from .scene_folder import SceneFolder
 
@@ -37,8 +38,9 @@ class Editor:
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene, set_scene: Callable[[Scene], None],
-                 pause: Callable[[bool], None], folder: str | Path = '.') -> None:
-        self._pause = pause
+                 pause: Callable[[bool], None], banner: Banner,
+                 folder: str | Path = '.') -> None:
+        self._pause, self._banner = pause, banner
         self._action_lock = threading.RLock()
         self._edited = EditedScene(scene, set_scene, pause, self._on_scene)
         self._display_lock = self._edited.lock
@@ -49,7 +51,7 @@ class Editor:
         """Name of the selected bone."""
         self.editing = False
         """Whether the source is paused in the bind pose."""
-        self.handles = Handles(server, self._on_pose, self._on_size)
+        self.handles = BodyHandles(server, self._on_pose, self._on_size)
         self.panel = EditorPanel(server.gui, self.select, self.suggest)
         self._connect(server.gui)
         with server.gui.add_folder('Files'):
@@ -82,6 +84,12 @@ class Editor:
             if not editing:
                 self._pause(False)
             self._set_editing(editing)
+
+    def set_mode(self, mode: Mode) -> None:
+        """Choose what the handles change."""
+        with self._display_lock:
+            self.handles.mode = mode
+            self._show_mode()
 
     def update_paused(self, paused: bool) -> None:
         """Take note whether the source is paused: if it was resumed elsewhere, editing ends."""
@@ -147,12 +155,14 @@ class Editor:
     def _connect(self, gui: viser.GuiApi) -> None:
         """Connect the panel's buttons, and hotkeys."""
         panel = self.panel
+        self._banner.on_action = self._on_action
         panel.limb.on_update(lambda _: self.show_handles())
+        panel.snap.on_update(lambda _: setattr(self.handles, 'snap', panel.snap.value))
         panel.update.on_click(lambda _: self.update())
         panel.add.on_click(lambda _: self.add_bone(panel.name.value))
         panel.remove.on_click(lambda _: self.remove_limb())
         for button, label, key, modifier, action in (
-                (panel.edit, 'Edit or run', 'E', None, self.toggle),
+                (panel.edit, 'Edit or run', None, None, self.toggle),
                 (panel.undo, 'Undo', 'Z', 'cmd/ctrl', self.undo),
                 (panel.redo, 'Redo', 'Z', 'cmd/ctrl+shift', self.redo)):
             command = gui.add_command(label, hotkey=key, modifier=modifier)
@@ -160,6 +170,13 @@ class Editor:
                 trigger(lambda _, action=action: action())
 
         add_listener(gui, 'enter', 'enter_key.js', lambda _, field: self._on_enter(field))
+
+    def _on_action(self, action: str) -> None:
+        """Start or end editing, or choose what the handles change; see Banner."""
+        if action in MODES:
+            self._in_order.submit(self.set_mode, action)
+        elif (action == 'edit') != self.editing:
+            self._in_order.submit(self.toggle)
 
     def _on_enter(self, field: str) -> None:
         """Apply what the field's form has at this moment: it may be typed further meanwhile."""
@@ -195,7 +212,7 @@ class Editor:
                     scene = mirror.mirrored(scene, name, self.panel.limb.value)
                 self.set_scene(scene, f'{action} {name}')
             except errors.RagdollError:
-                self.show_handles()
+                self.handles.reset()
                 raise
 
     def _on_scene(self, reason: Reason) -> None:
@@ -207,8 +224,14 @@ class Editor:
     def _set_editing(self, editing: bool) -> None:
         with self._display_lock:
             self.editing = editing
+            # The page may still tell how it was before: it has to see the pause first.
+            self._was_paused = False
             self.panel.show_editing(editing)
-            self.show_handles()
+            self._show_mode()
+
+    def _show_mode(self) -> None:
+        self._banner.show(self.handles.mode if self.editing else None)
+        self.show_handles()
 
     def _refresh(self, keep_typed: bool = False) -> None:
         """Show the current scene and the selected bone; ``keep_typed``: see Form.fill."""

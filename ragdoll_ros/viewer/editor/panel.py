@@ -27,7 +27,8 @@ class EditorPanel:
     def __init__(self, gui: viser.GuiApi, select: Callable[[str | None], None],
                  suggest: Callable[[str, str], None]) -> None:
         self._filling = CallbackGuard()
-        self.edit = gui.add_button('Edit', icon='pencil', hint='E: pause in the bind pose')
+        self.edit = gui.add_button('Edit', icon='pencil',
+                                   hint='E: pauses in the bind pose; Space runs')
         self.undo = gui.add_button('Undo', icon='arrow-back-up', hint='Ctrl+Z')
         self.redo = gui.add_button('Redo', icon='arrow-forward-up', hint='Ctrl+Shift+Z')
         self.doll = gui.add_dropdown('doll', (NONE,), visible=False, hint='selects its root')
@@ -36,6 +37,7 @@ class EditorPanel:
                                      'moves with it; else the body alone, and joints stay')
         self.both = gui.add_checkbox('both sides', False,
                                      hint='the bone on the other side becomes its mirror image')
+        self.snap = gui.add_checkbox('snap', False, hint='handles go in steps of 1 cm and 5°')
         gui.add_html(style('form.css'))
         self.body_folder = gui.add_folder('Body')
         with self.body_folder:
@@ -72,7 +74,8 @@ class EditorPanel:
     def show_values(self, values: FormValues | None, parent: str | None, keep_typed: bool) -> None:
         """Show a bone's values, or hide the form; ``keep_typed``: see Form.fill."""
         self.show_message('')
-        for part in (self.body_folder, self.growth_folder, self.update, self.limb, self.both):
+        for part in (self.body_folder, self.growth_folder, self.update, self.limb, self.both,
+                     self.snap):
             part.visible = values is not None
         self.joint_folder.visible = values is not None and 'kind' in values
         self.joint_folder.label = f'Joint to {parent}'
