@@ -27,6 +27,7 @@ from ragdoll_ros.model.scene import above_ground  # noqa: E402
 from ragdoll_ros.physics.simulation import Simulation  # noqa: E402
 from ragdoll_ros.recordings.recording import Recording  # noqa: E402
 from ragdoll_ros.viewer.editor import changes, scene_folder  # noqa: E402
+from ragdoll_ros.viewer.editor.banner import Banner  # noqa: E402
 from ragdoll_ros.viewer.editor.editor import Editor  # noqa: E402
 from ragdoll_ros.viewer.sources.playback import PlaybackSource  # noqa: E402
 from ragdoll_ros.viewer.sources.simulation import SimulationSource  # noqa: E402
@@ -52,7 +53,8 @@ class Desk:
         self.asked = []
         self.reason = ''
         self.path = path
-        self.editor = Editor(server, scene, lambda scene: self.use(scene), self.asked.append, path)
+        self.editor = Editor(server, scene, lambda scene: self.use(scene), self.asked.append,
+                             Banner(server.gui), path)
         self.panel, self.files = self.editor.panel, self.editor.files
 
     def use(self, scene):
@@ -297,7 +299,7 @@ def test_a_recording_at_its_end_is_not_started(server, tmp_path):
     # From here on it would take a quarter of an hour.
     source.set_real_time_factor(0.001)
     server.gui.reset()
-    editor = Editor(server, DROP, source.set_scene, source.pause, tmp_path)
+    editor = Editor(server, DROP, source.set_scene, source.pause, Banner(server.gui), tmp_path)
     editor.update_paused(source.status.paused)
     editor.toggle()
     assert 'a recording has one scene' in editor.panel.message.content
@@ -327,6 +329,8 @@ def test_handles_move_turn_and_resize(desk):
     drag(desk.editor.handles.body, turn=turn)
     assert desk.bone('left_forearm').position == bone.position
     assert desk.panel.body['rotation'].value == '0, 0, 28.64789'
+    desk.editor.set_mode('size')
+    assert desk.editor.handles.body is None
     # From the middle to a corner.
     drag(desk.editor.handles.size, (0.02, 0.15, 0.03))
     assert desk.bone('left_forearm').shape.size == pytest.approx((0.04, 0.3, 0.06))
@@ -339,14 +343,51 @@ def test_handles_move_turn_and_resize(desk):
     assert desk.editor.scene == DROP
 
 
+def test_handles_go_in_steps_if_so_chosen(desk):
+    """Of 1 cm along the body's own axes, of 5 degrees, and of 1 cm of an edge."""
+    desk.editor.select('left_forearm')
+    desk.editor.toggle()
+    start, tilted = desk.bone('left_forearm'), rotation.from_axis_angle((1, 0, 0), 0.5)
+    desk.panel.snap.value = True
+    drag(desk.editor.handles.body, turn=tilted)
+    assert desk.panel.body['rotation'].value == '30, 0, 0'
+    along = rotation.rotate(rotation.from_axis_angle((1, 0, 0), np.pi / 6), (0, 0, 1))
+    drag(desk.editor.handles.body, start.position + 0.0337 * along)
+    assert np.subtract(desk.bone('left_forearm').position, start.position) == pytest.approx(
+        0.03 * along)
+    desk.editor.set_mode('size')
+    x, y, z = start.shape.half_extents
+    drag(desk.editor.handles.size, (x, y + 0.0233, z))
+    assert desk.bone('left_forearm').shape.size == pytest.approx((2 * x, 2 * y + 0.05, 2 * z))
+    desk.panel.snap.value = False
+    drag(desk.editor.handles.size, (x, y + 0.0337, z))
+    assert desk.bone('left_forearm').shape.size == pytest.approx((2 * x, 2 * y + 0.0674, 2 * z))
+
+
+def test_a_click_on_a_handle_changes_and_replaces_nothing(desk):
+    """Nor does a drag by less than a step, but that one goes back."""
+    desk.editor.select('left_forearm')
+    desk.editor.toggle()
+    asked, root, start = list(desk.asked), desk.editor.handles.root, desk.bone('left_forearm')
+    drag(desk.editor.handles.body)
+    desk.panel.body['mass'].value = '2'
+    assert desk.asked == asked and desk.editor.handles.root == root
+    desk.panel.snap.value = True
+    drag(desk.editor.handles.body, np.add(start.position, (0, 0, 0.004)))
+    assert desk.asked == asked and desk.editor.handles.root != root
+    assert tuple(desk.editor.handles.body.position) == start.position
+
+
 def test_a_body_of_several_shapes_is_shown_moved_and_saved(server, desk):
     """It has no handle for its size and no fields of a shape; the next body has them again."""
     scene = changes.change_bone(DROP, 'left_forearm', shape=HAMMER)
     desk.editor.show(scene)
     desk.editor.select('left_forearm')
     desk.editor.toggle()
+    desk.editor.set_mode('size')
     assert desk.editor.handles.size is None
     assert not desk.panel.body['shape'].visible and not desk.panel.body['size'].visible
+    desk.editor.set_mode('move')
     ghosts = [server.scene.get_handle_by_name(f'{desk.editor.handles.root}/frame/outline_{number}')
               for number in range(len(HAMMER.primitives))]
     for ghost, part in zip(ghosts, HAMMER.primitives, strict=True):
@@ -358,6 +399,7 @@ def test_a_body_of_several_shapes_is_shown_moved_and_saved(server, desk):
     desk.files.save()
     assert load_scene(str(desk.path / 'hammer.yaml')) == desk.editor.scene
     desk.editor.select('head')
+    desk.editor.set_mode('size')
     assert desk.editor.handles.size is not None and desk.panel.body['shape'].visible
 
 
@@ -370,6 +412,7 @@ def test_round_bodies_are_resized_along_their_own_sizes(desk, bone, corner, size
         desk.panel.body['shape'].value = 'capsule'
         desk.editor.update()
     desk.editor.toggle()
+    desk.editor.set_mode('size')
     drag(desk.editor.handles.size, corner)
     assert vars(desk.bone(bone).shape) == pytest.approx(sizes)
 
@@ -769,7 +812,7 @@ def test_on_a_running_simulation(server, tmp_path):
     server.gui.reset()
     server.scene.reset()
     try:
-        editor = Editor(server, DROP, source.set_scene, source.pause, tmp_path)
+        editor = Editor(server, DROP, source.set_scene, source.pause, Banner(server.gui), tmp_path)
         wait(lambda: source.frame.time > 0.1)
         editor.select('head')
         editor.toggle()

@@ -15,8 +15,9 @@ from .drawing.camera import Cameras
 from .drawing.display_options import DisplayOptions, configure_theme
 from .drawing.plots import Plots
 from .drawing.stage import Stage, configure_lights
+from .editor.banner import Banner
 from .editor.editor import Editor
-from .editor.handles import ROOT
+from .editor.handles.body_handles import ROOT
 from .pointer import Pointer
 from .pushing.hover import Hover
 from .pushing.motion import doll_mean
@@ -72,6 +73,7 @@ class Page:
                      script('hide_drag_arrow.js'), script('handle_picking.js', ROOT=ROOT),
                      script('upload_notices.js'), script('decimal_comma.js')):
             server.gui.add_html(html)
+        self._edit_banner = Banner(server.gui)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
@@ -186,7 +188,7 @@ class Page:
             return
         with self._edit_tab:
             self.editor = Editor(self.server, scene, self.source.set_scene, self.source.pause,
-                                 self._folder)
+                                 self._edit_banner, self._folder)
         self.controls.before_step = self.editor.leave
 
     def _show_messages(self, problem: str, note: str) -> None:

@@ -22,7 +22,7 @@ def source(name: str) -> str:
     return (FOLDER / name).read_text('utf-8')
 
 
-def script(*names: str, **constants: str) -> str:
+def script(*names: str, **constants: object) -> str:
     """HTML that runs scripts as one function, whose ``this`` is an <img> in the panel.
 
     ``constants``: names and values of the constants that the scripts use. A script runs each time

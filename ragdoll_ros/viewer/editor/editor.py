@@ -2,9 +2,9 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +12,17 @@ import viser
 
 from ...model import errors
 from ...model.scene import Scene
+from ..browser.scripts import add_listener
+from ..viser_internals import handle_id
 from ..widgets.error_text import error_text
+from ..widgets.form import FormValues
 from . import bone_form, changes, mirror
+from .banner import MODES, Banner
+from .edited_scene import EditedScene, Reason
 from .files_panel import FilesPanel
-from .handles import Handles
+from .handles.body_handles import BodyHandles, Mode
 from .panel import EditorPanel
 from .scene_folder import SceneFolder
-from .undo_history import UndoHistory
-
-MAX_PENDING = 20
-"""Scenes sent to the source that the page has not shown yet."""
 
 
 class Editor:
@@ -30,26 +31,27 @@ class Editor:
     While editing, the source is paused in the bind pose, the selected body has handles, and each
     change is shown at once. Otherwise the simulation runs, and Update restarts it with the change.
 
-    ``set_scene`` restarts the source with a scene, or raises RagdollError: then the change is
-    refused and the scene stays. ``pause`` pauses or resumes the source.
+    ``set_scene`` and ``pause``: see EditedScene.
 
     Callbacks come from many threads and are serialized. `show` and `select`, which the page calls,
     never wait for ``set_scene``.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene, set_scene: Callable[[Scene], None],
-                 pause: Callable[[bool], None], folder: str | Path = '.') -> None:
-        self._set_source_scene, self._pause = set_scene, pause
+                 pause: Callable[[bool], None], banner: Banner,
+                 folder: str | Path = '.') -> None:
+        self._pause, self._banner = pause, banner
         self._action_lock = threading.RLock()
-        self._display_lock = threading.RLock()
-        self._history = UndoHistory(scene)
-        self._pending: deque[Scene] = deque(maxlen=MAX_PENDING)
+        self._edited = EditedScene(scene, set_scene, pause, self._on_scene)
+        self._display_lock = self._edited.lock
+        self._in_order = ThreadPoolExecutor(1)
+        """Runs what is entered by keys, one after the other."""
         self._was_paused = False
         self.bone: str | None = None
         """Name of the selected bone."""
         self.editing = False
         """Whether the source is paused in the bind pose."""
-        self.handles = Handles(server, self._on_pose, self._on_size)
+        self.handles = BodyHandles(server, self._on_pose, self._on_size)
         self.panel = EditorPanel(server.gui, self.select, self.suggest)
         self._connect(server.gui)
         with server.gui.add_folder('Files'):
@@ -59,17 +61,11 @@ class Editor:
     @property
     def scene(self) -> Scene:
         """The current scene."""
-        return self._history.scene
+        return self._edited.current
 
     def show(self, scene: Scene) -> None:
         """Take note that the page shows another scene."""
-        with self._display_lock:
-            if scene in self._pending:
-                # Sent by the editor; the page draws late, and may have skipped some before it.
-                while self._pending.popleft() != scene:
-                    pass
-            elif scene != self.scene:
-                self._push(scene, f'scene {scene.name}')
+        self._edited.show(scene)
 
     def select(self, bone: str | None) -> None:
         """Select a bone by its name in the scene; an unknown name or None deselects."""
@@ -83,10 +79,17 @@ class Editor:
         """Start editing in the bind pose, or end it and run."""
         with self._reporting_errors():
             editing = not self.editing
-            self._restart(self.scene, editing)
+            self._edited.restart(self.scene, editing,
+                                 resume_if_refused=editing and not self._was_paused)
             if not editing:
                 self._pause(False)
             self._set_editing(editing)
+
+    def set_mode(self, mode: Mode) -> None:
+        """Choose what the handles change."""
+        with self._display_lock:
+            self.handles.mode = mode
+            self._show_mode()
 
     def update_paused(self, paused: bool) -> None:
         """Take note whether the source is paused: if it was resumed elsewhere, editing ends."""
@@ -102,31 +105,27 @@ class Editor:
 
     def update(self) -> None:
         """Apply the values of the form, or show errors below them and change nothing."""
-        def change(name: str) -> Scene:
-            values, found = self.panel.values()
-            return bone_form.apply_values(self.scene, name, values, self.panel.limb.value, found)
-
-        self._change(change, 'numbers of')
+        self._apply(*self._typed())
 
     def undo(self) -> None:
         """Go one step back."""
-        self._step(self._history.undo, self._history.redo)
+        with self._reporting_errors():
+            self._edited.undo(self.editing)
 
     def redo(self) -> None:
         """Go one step forward."""
-        self._step(self._history.redo, self._history.undo)
+        with self._reporting_errors():
+            self._edited.redo(self.editing)
 
     def set_scene(self, scene: Scene, name: str) -> None:
         """Make a scene current, as a change called ``name``; RagdollError if it is refused."""
         with self._action_lock:
-            self._restart(scene, self.editing)
-            with self._display_lock:
-                self._push(scene, name)
+            self._edited.set(scene, name, self.editing)
 
     def suggest(self, key: str, kind: str) -> None:
         """Fill the form with values for another kind of shape or joint, to be edited further."""
         with self._reporting_errors():
-            name = self._selected()
+            name = _existing(self.bone)
             change = changes.set_shape if key == 'shape' else changes.set_joint_kind
             form = self.panel.body if key == 'shape' else self.panel.joint
             form.fill(bone_form.read_bone(change(self.scene, name, kind), name))
@@ -142,7 +141,7 @@ class Editor:
     def add_bone(self, name: str) -> None:
         """Add a bone at the end of the selected one, and select it."""
         with self._reporting_errors():
-            parent, name = self._selected(), name.strip()
+            parent, name = _existing(self.bone), name.strip()
             self.set_scene(changes.add_bone(self.scene, parent, name), f'add {name}')
             placement, _ = changes.find(self.scene, parent)
             self.select(self.scene.qualified(placement, name))
@@ -150,107 +149,101 @@ class Editor:
     def remove_limb(self) -> None:
         """Remove the selected bone and its subtree."""
         with self._reporting_errors():
-            name = self._selected()
+            name = _existing(self.bone)
             self.set_scene(changes.remove_limb(self.scene, name), f'remove {name}')
 
     def _connect(self, gui: viser.GuiApi) -> None:
         """Connect the panel's buttons, and hotkeys."""
         panel = self.panel
+        self._banner.on_action = self._on_action
         panel.limb.on_update(lambda _: self.show_handles())
+        panel.snap.on_update(lambda _: setattr(self.handles, 'snap', panel.snap.value))
         panel.update.on_click(lambda _: self.update())
         panel.add.on_click(lambda _: self.add_bone(panel.name.value))
         panel.remove.on_click(lambda _: self.remove_limb())
         for button, label, key, modifier, action in (
-                (panel.edit, 'Edit or run', 'E', None, self.toggle),
+                (panel.edit, 'Edit or run', None, None, self.toggle),
                 (panel.undo, 'Undo', 'Z', 'cmd/ctrl', self.undo),
                 (panel.redo, 'Redo', 'Z', 'cmd/ctrl+shift', self.redo)):
             command = gui.add_command(label, hotkey=key, modifier=modifier)
             for trigger in (button.on_click, command.on_trigger):
                 trigger(lambda _, action=action: action())
 
+        add_listener(gui, 'enter', 'enter_key.js', lambda _, field: self._on_enter(field))
+
+    def _on_action(self, action: str) -> None:
+        """Start or end editing, or choose what the handles change; see Banner."""
+        if action in MODES:
+            self._in_order.submit(self.set_mode, action)
+        elif (action == 'edit') != self.editing:
+            self._in_order.submit(self.toggle)
+
+    def _on_enter(self, field: str) -> None:
+        """Apply what the field's form has at this moment: it may be typed further meanwhile."""
+        if self.panel.has(field):
+            self._in_order.submit(self._apply, *self._typed())
+        elif field == handle_id(self.panel.name):
+            self._in_order.submit(self.add_bone, self.panel.name.value)
+
+    def _typed(self) -> tuple[str | None, FormValues, list[errors.ModelError]]:
+        """The selected bone, the values of the form, and errors of those that cannot be read."""
+        with self._display_lock:
+            return self.bone, *self.panel.values()
+
+    def _apply(self, bone: str | None, values: FormValues, found: list[errors.ModelError]) -> None:
+        self._change(lambda name: bone_form.apply_values(
+            self.scene, name, values, self.panel.limb.value, found), 'numbers of', bone)
+
     def _on_pose(self, position: np.ndarray, orientation: np.ndarray) -> None:
         self._change(lambda name: changes.set_pose(
-            self.scene, name, position, orientation, self.panel.limb.value), 'move')
+            self.scene, name, position, orientation, self.panel.limb.value), 'move', self.bone)
 
     def _on_size(self, half_extents: np.ndarray) -> None:
-        self._change(lambda name: changes.set_size(self.scene, name, half_extents), 'size of')
+        self._change(lambda name: changes.set_size(self.scene, name, half_extents), 'size of',
+                     self.bone)
 
-    def _change(self, change: Callable[[str], Scene], action: str) -> None:
-        """Change the selected bone, on both sides if so chosen; if refused, reset the handles."""
+    def _change(self, change: Callable[[str], Scene], action: str, bone: str | None) -> None:
+        """Change a bone, on both sides if so chosen; if that is refused, reset the handles."""
         with self._reporting_errors():
-            name = self._selected()
+            name = _existing(bone)
             try:
                 scene = change(name)
                 if self.panel.both.value:
                     scene = mirror.mirrored(scene, name, self.panel.limb.value)
                 self.set_scene(scene, f'{action} {name}')
             except errors.RagdollError:
-                self.show_handles()
+                self.handles.reset()
                 raise
 
-    def _push(self, scene: Scene, name: str) -> None:
-        """Add a scene to the history; one with another name starts a new history."""
-        if scene.name == self.scene.name:
-            self._history.push(scene, name)
-        else:
-            self._history = UndoHistory(scene)
+    def _on_scene(self, reason: Reason) -> None:
+        """Show a scene that has become current."""
+        if reason == 'other':
             self.files.forget()
-        self._refresh()
-
-    def _step(self, step: Callable[[], Scene], revert: Callable[[], Scene]) -> None:
-        """Go a step in the history; revert it if the source refuses the scene."""
-        with self._reporting_errors():
-            before = self.scene
-            scene = step()
-            if scene is before:
-                return
-            try:
-                self._restart(scene, self.editing)
-            except errors.RagdollError:
-                revert()
-                raise
-            with self._display_lock:
-                self._refresh()
+        self._refresh(keep_typed=reason == 'change')
 
     def _set_editing(self, editing: bool) -> None:
         with self._display_lock:
             self.editing = editing
+            # The page may still tell how it was before: it has to see the pause first.
+            self._was_paused = False
             self.panel.show_editing(editing)
-            self.show_handles()
+            self._show_mode()
 
-    def _restart(self, scene: Scene, pause: bool) -> None:
-        """Restart the source with a scene; a refused one is not pending."""
-        with self._display_lock:
-            self._pending.append(scene)
-        was_paused = self._was_paused
-        if pause:
-            # Before the scene is set, so that no tick is made with it.
-            self._pause(True)
-        try:
-            self._set_source_scene(scene)
-        except errors.RagdollError:
-            with self._display_lock, suppress(ValueError):
-                self._pending.remove(scene)
-            if pause and not (was_paused or self.editing):
-                self._pause(False)
-            raise
+    def _show_mode(self) -> None:
+        self._banner.show(self.handles.mode if self.editing else None)
+        self.show_handles()
 
-    def _selected(self) -> str:
-        if self.bone is None:
-            raise errors.UnknownBone('bone', None, 'a bone of the list, or a click on one')
-        return self.bone
-
-    def _refresh(self) -> None:
-        """Show the current scene and the selected bone."""
+    def _refresh(self, keep_typed: bool = False) -> None:
+        """Show the current scene and the selected bone; ``keep_typed``: see Form.fill."""
         scene = self.scene
         if self.bone not in scene.bone_names:
-            self.bone = None
+            self.bone, keep_typed = None, False
         self.panel.show_bones(scene, self.bone)
-        self.panel.show_history(self._history)
+        self.panel.show_history(self._edited.history)
         joint = None if self.bone is None else changes.joint_of(scene, self.bone)
         self.panel.show_values(
             None if self.bone is None else bone_form.read_bone(scene, self.bone),
-            joint and joint.parent)
+            joint and joint.parent, keep_typed)
         self.show_handles()
 
     @contextmanager
@@ -266,3 +259,9 @@ class Editor:
                 self.panel.show_errors([error])
             except errors.RagdollError as error:
                 self.panel.show_message(error_text(error))
+
+
+def _existing(bone: str | None) -> str:
+    if bone is None:
+        raise errors.UnknownBone('bone', None, 'a bone of the list, or a click on one')
+    return bone

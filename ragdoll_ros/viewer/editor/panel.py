@@ -15,6 +15,8 @@ from .undo_history import UndoHistory
 
 NONE = '(no bone)'
 
+KEYS = {field.key for field in (*BODY, *JOINT)}
+
 
 class EditorPanel:
     """Widgets in the GUI container that is current; the editor connects the buttons.
@@ -25,7 +27,8 @@ class EditorPanel:
     def __init__(self, gui: viser.GuiApi, select: Callable[[str | None], None],
                  suggest: Callable[[str, str], None]) -> None:
         self._filling = CallbackGuard()
-        self.edit = gui.add_button('Edit', icon='pencil', hint='E: pause in the bind pose')
+        self.edit = gui.add_button('Edit', icon='pencil',
+                                   hint='E: pauses in the bind pose; Space runs')
         self.undo = gui.add_button('Undo', icon='arrow-back-up', hint='Ctrl+Z')
         self.redo = gui.add_button('Redo', icon='arrow-forward-up', hint='Ctrl+Shift+Z')
         self.doll = gui.add_dropdown('doll', (NONE,), visible=False, hint='selects its root')
@@ -34,6 +37,7 @@ class EditorPanel:
                                      'moves with it; else the body alone, and joints stay')
         self.both = gui.add_checkbox('both sides', False,
                                      hint='the bone on the other side becomes its mirror image')
+        self.snap = gui.add_checkbox('snap', False, hint='handles go in steps of 1 cm and 5°')
         gui.add_html(style('form.css'))
         self.body_folder = gui.add_folder('Body')
         with self.body_folder:
@@ -42,7 +46,8 @@ class EditorPanel:
         with self.joint_folder:
             self.joint = Form(gui, JOINT, suggest)
         self.update = gui.add_button('Update', icon='check', color='green',
-                                     hint='apply the values; a running simulation restarts')
+                                     hint='Enter in a field: apply the values; a running '
+                                     'simulation restarts')
         self.message = gui.add_html('')
         self.growth_folder = gui.add_folder('Bones', expand_by_default=False)
         with self.growth_folder:
@@ -66,15 +71,20 @@ class EditorPanel:
             _set_options(self.bone, (NONE, *scene.bone_names[scene.bone_slices[index]]),
                          selected or NONE)
 
-    def show_values(self, values: FormValues | None, parent: str | None) -> None:
-        """Show a bone's values, or hide the form."""
+    def show_values(self, values: FormValues | None, parent: str | None, keep_typed: bool) -> None:
+        """Show a bone's values, or hide the form; ``keep_typed``: see Form.fill."""
         self.show_message('')
-        for part in (self.body_folder, self.growth_folder, self.update, self.limb, self.both):
+        for part in (self.body_folder, self.growth_folder, self.update, self.limb, self.both,
+                     self.snap):
             part.visible = values is not None
         self.joint_folder.visible = values is not None and 'kind' in values
         self.joint_folder.label = f'Joint to {parent}'
-        self.body.fill(values or {})
-        self.joint.fill(values or {})
+        self.body.fill(values or {}, keep_typed)
+        self.joint.fill(values or {}, keep_typed)
+
+    def has(self, widget_id: str) -> bool:
+        """Whether a widget with this id is a field of the form."""
+        return self.body.has(widget_id) or self.joint.has(widget_id)
 
     def values(self) -> tuple[FormValues, list[errors.ModelError]]:
         """Values of the form, and errors of those that cannot be read."""
@@ -82,12 +92,19 @@ class EditorPanel:
         return {**body, **joint}, in_body + in_joint
 
     def show_errors(self, found: Iterable[errors.ModelError]) -> None:
-        """Show each error below its field; others below the Update button."""
+        """Show each error below its field; below the Update button others, and the fields' names.
+
+        The button may be seen where the field is not.
+        """
         found = list(found)
         self.body.show_errors(found)
         self.joint.show_errors(found)
-        keys = {field.key for field in (*BODY, *JOINT)}
-        self.show_message('\n'.join(error_text(error) for error in found if error.path not in keys))
+        paths = {error.path for error in found}
+        names = [field.name for field in (*BODY, *JOINT) if field.key in paths]
+        lines = [error_text(error) for error in found if error.path not in KEYS]
+        if names:
+            lines.insert(0, f'Nothing is applied: see {", ".join(names)}')
+        self.show_message('\n'.join(lines))
 
     def show_message(self, text: str) -> None:
         """Show why something was refused, below the Update button; empty text clears it."""

@@ -14,11 +14,15 @@ from ...model import errors
 from ...model.ragdoll import JOINT_KINDS
 from ...model.shapes import SHAPES
 from ..browser.scripts import add_listener
+from ..viser_internals import handle_id
 from . import parsing
 from .error_text import field_error
 
 NUMBERS = ('number', 'vector')
 """Widgets of one number and of three; both are text fields."""
+
+TYPED = (*NUMBERS, 'text')
+"""Widgets into which text is typed, besides colours."""
 
 RED, AMBER, GREEN, GREY = (f'var(--ragdoll-{name})' for name in ('red', 'amber', 'green', 'grey'))
 
@@ -37,6 +41,16 @@ class Field:
     widget: str
     hint: str
 
+    @property
+    def name(self) -> str:
+        """Label without the unit."""
+        return self.label.partition(', ')[0]
+
+    @property
+    def unit(self) -> str:
+        """Unit in the label; empty if there is none."""
+        return self.label.partition(', ')[2]
+
 
 class CallbackGuard(threading.local):
     """Marks callbacks that the program causes: ``active`` while its thread is in the context."""
@@ -53,15 +67,19 @@ class CallbackGuard(threading.local):
 class Form:
     """Widgets of fields. The text that users type stays until the program fills the form.
 
-    ``on_kind`` takes the key and the value of a shape or joint kind that a user chooses.
+    ``on_kind`` takes the key and the value of a shape or joint kind that a user chooses. Values may
+    be read in one thread while another one fills the form.
     """
 
     def __init__(self, gui: viser.GuiApi, fields: Sequence[Field],
                  on_kind: Callable[[str, str], None]) -> None:
         self._fields = {field.key: field for field in fields}
         self._widgets: dict[str, Any] = {}
+        self._lock = threading.RLock()
         self._filled: dict[str, tuple[str, FieldValue]] = {}
-        """Text and exact value that a field of numbers was filled with."""
+        """Text and exact value that a field was last filled with."""
+        self._submitted: dict[str, tuple[str, FieldValue]] = {}
+        """Text and value that were last read from a field."""
         self.errors: dict[str, viser.GuiHtmlHandle] = {}
         """Error texts below the fields; visible if there is an error."""
         self._colors: dict[str, FieldValue] = {}
@@ -82,26 +100,37 @@ class Form:
         """Widget of a field."""
         return self._widgets[key]
 
-    def fill(self, values: FormValues) -> None:
-        """Show these fields only, without errors; typed text that has the same value stays."""
+    def has(self, widget_id: str) -> bool:
+        """Whether a widget with this id is a field of the form."""
+        return any(handle_id(widget) == widget_id for widget in self._widgets.values())
+
+    def fill(self, values: FormValues, keep_typed: bool = False) -> None:
+        """Show these fields only, without errors; typed text that has the same value stays.
+
+        ``keep_typed``: text that was typed since the values were read stays as well, unless
+        something else has changed the value of its field.
+        """
         self.show_errors(())
         self._color_errors.clear()
-        with self._filling:
+        with self._lock, self._filling:
             for key, widget in self._widgets.items():
                 widget.visible = key in values
                 if key in values:
-                    self._fill(key, widget, values[key])
+                    self._fill(key, widget, values[key], keep_typed)
 
     def values(self) -> tuple[FormValues, list[errors.ModelError]]:
         """Values of the visible fields, and errors of those that cannot be read."""
         values: FormValues = {}
         found = []
-        for key, widget in self._widgets.items():
-            if widget.visible:
-                try:
-                    values[key] = self._read(key, widget.value)
-                except errors.ModelError as error:
-                    found.append(error.at(key))
+        with self._lock:
+            for key, widget in self._widgets.items():
+                if widget.visible:
+                    text = widget.value
+                    try:
+                        values[key] = self._read(key, text)
+                        self._submitted[key] = text, values[key]
+                    except errors.ModelError as error:
+                        found.append(error.at(key))
         return values, found
 
     def show_errors(self, found: Iterable[errors.ModelError]) -> None:
@@ -113,7 +142,7 @@ class Form:
     def _show_error(self, key: str, error: errors.ModelError | None) -> None:
         html_, text = self.errors[key], ''
         if error is not None:
-            text = field_error(error, *_name_and_unit(self._fields[key]))
+            text = field_error(error, self._fields[key].name, self._fields[key].unit)
         html_.content = colored(text, RED)
         html_.visible = error is not None
 
@@ -140,19 +169,27 @@ class Form:
         widget.on_update(on_picked)
         add_listener(gui, key, 'color_text.js', on_typed, widget)
 
-    def _fill(self, key: str, widget: Any, value: FieldValue) -> None:
-        if self._fields[key].widget == 'color':
+    def _fill(self, key: str, widget: Any, value: FieldValue, keep_typed: bool) -> None:
+        kind, stays = self._fields[key].widget, keep_typed and self._is_typed(key, widget, value)
+        if kind == 'color':
             self._colors[key] = value
-        if self._fields[key].widget not in NUMBERS:
-            widget.value = value
-            return
-        with suppress(errors.ModelError):
-            if self._read(key, widget.value) == value:
-                self._filled[key] = widget.value, value
-                return
-        text = parsing.format_numbers(value if isinstance(value, tuple) else (value,))
+        text: Any = value
+        if kind in NUMBERS:
+            with suppress(errors.ModelError):
+                if self._read(key, widget.value) == value:
+                    self._filled[key] = widget.value, value
+                    return
+            text = parsing.format_numbers(value if isinstance(value, tuple) else (value,))
         self._filled[key] = text, value
-        widget.value = text
+        if not stays:
+            widget.value = text
+
+    def _is_typed(self, key: str, widget: Any, value: FieldValue) -> bool:
+        """Whether the field has text that was typed since it was read, and ``value`` is not new."""
+        known = [pair for pair in (self._filled.get(key), self._submitted.get(key)) if pair]
+        return (self._fields[key].widget in TYPED
+                and all(widget.value != text for text, _ in known)
+                and any(value == known_value for _, known_value in known))
 
     def _read(self, key: str, given: Any) -> FieldValue:
         """Value of a widget's content; unchanged parts of a text keep their exact values."""
@@ -164,7 +201,7 @@ class Form:
         text, value = self._filled.get(key, ('', 0.0))
         if given == text:
             return value
-        unit = _name_and_unit(field)[1]
+        unit = field.unit
         if field.widget == 'number':
             return parsing.parse_number(given, unit)
         new = parsing.parse_numbers(given, 3, unit)
@@ -177,12 +214,6 @@ class Form:
     def _on_choice(self, key: str) -> None:
         if not self._filling.active:
             self._on_kind(key, self._widgets[key].value)
-
-
-def _name_and_unit(field: Field) -> tuple[str, str]:
-    """Name and unit of a field, from its label."""
-    name, _, unit = field.label.partition(', ')
-    return name, unit
 
 
 def colored(text: str, color: str) -> str:

@@ -2,17 +2,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Literal
 
 import numpy as np
 import viser
 
-from ...model import rotation
-from ...model.ragdoll import Bone, Joint
-from ...model.scene import Placement, Scene, height
-from ...model.shapes import SHAPES
-from ..drawing.bodies import WXYZ
-from ..drawing.meshes import MESHES
-from .changes import find, joint_of
+from ....model import rotation
+from ....model.ragdoll import Bone, Joint
+from ....model.scene import Placement, Scene, height
+from ....model.shapes import SHAPES
+from ...drawing.bodies import WXYZ
+from ...drawing.meshes import MESHES
+from ..changes import find, joint_of
+from . import snapping
+
+Mode = Literal['move', 'turn', 'size']
+"""What the handles change."""
 
 ROOT = '/editor'
 """Node of all handles in viser's scene tree."""
@@ -29,8 +34,10 @@ TOLERANCE = 1e-6
 """m, and rad: smaller motions of a drag are ignored."""
 
 
-class Handles:
-    """Handles of one body at a time, with callbacks at the end of a drag.
+class BodyHandles:
+    """Handles of one body and of one mode at a time, with callbacks at the end of a drag.
+
+    They are replaced only where they change: a drag of one that is replaced is lost.
 
     ``on_pose`` takes the new centre of mass (3,) m and orientation (4,), doll's frame;
     ``on_size`` the new half extents (3,) m in the body's frame.
@@ -41,38 +48,55 @@ class Handles:
                  on_size: Callable[[np.ndarray], None]) -> None:
         self._server = server
         self._on_pose, self._on_size = on_pose, on_size
+        self.mode: Mode = 'move'
+        self.snap = False
+        """Whether drags go in steps: see snapping.py."""
         self.body: viser.TransformControlsHandle | None = None
         self.size: viser.TransformControlsHandle | None = None
         self.root = ROOT
         """Node of the current handles. The name is new each time: viser keeps the old pose of a
         node that is added again at the origin."""
         self._count = 0
+        self._shown: tuple | None = None
+        """What the handles depend on."""
+        self._reset: Callable[[], None] = lambda: None
 
     def hide(self) -> None:
         """Remove all handles."""
         if self.body is not None:
             self._server.scene.remove_by_name(self.root)
-        self.body = self.size = None
+        self.body = self.size = self._shown = None
+
+    def reset(self) -> None:
+        """Put the handles back after a drag that has changed nothing."""
+        if self._shown is not None:
+            self._shown = None
+            self._reset()
 
     def show(self, scene: Scene, name: str, limb: bool) -> None:
         """Show handles of a bone; with ``limb`` they rotate it about its joint, not its centre."""
+        (placement, bone), joint = find(scene, name), joint_of(scene, name)
+        origin = placement.position + _lift(scene, placement)
+        shown = name, self.mode, limb, *origin, placement.orientation, bone, joint
+        if shown == self._shown:
+            return
         self.hide()
+        self._shown, self._reset = shown, lambda: self.show(scene, name, limb)
         self._count += 1
         self.root = f'{ROOT}/{self._count}'
-        (placement, bone), joint = find(scene, name), joint_of(scene, name)
         at = joint.anchor if limb and joint else bone.position
         with self._server.atomic():
             self._server.scene.add_frame(
-                self.root, position=placement.position + _lift(scene, placement),
-                wxyz=_wxyz(placement.orientation), show_axes=False)
+                self.root, position=origin, wxyz=_wxyz(placement.orientation), show_axes=False)
             self._frame = self._server.scene.add_frame(
                 f'{self.root}/frame', position=bone.position, wxyz=_wxyz(bone.orientation),
                 show_axes=False)
             self._add_outline(bone)
             if joint is not None:
                 self._add_pivot(joint, bone)
-            self._add_body(bone, at)
-            if bone.shape.kind in SHAPES:
+            if self.mode != 'size':
+                self._add_body(bone, at)
+            elif bone.shape.kind in SHAPES:
                 self._add_size(bone)
 
     def _add_outline(self, bone: Bone) -> None:
@@ -97,21 +121,31 @@ class Handles:
     def _add_body(self, bone: Bone, at: Sequence[float]) -> None:
         self.body = self._server.scene.add_transform_controls(
             f'{self.root}/body', scale=2.5 * max(bone.shape.half_extents), depth_test=False,
-            opacity=0.8, position=at, wxyz=_wxyz(bone.orientation))
+            opacity=0.8, position=at, wxyz=_wxyz(bone.orientation),
+            disable_axes=self.mode == 'turn', disable_sliders=self.mode == 'turn',
+            disable_rotations=self.mode == 'move')
         # Centre of the body in the handle's frame.
         back = rotation.inverse(bone.orientation)
         arm = rotation.rotate(back, np.subtract(bone.position, at))
-        body, frame = self.body, self._frame
+        body, frame, start = self.body, self._frame, _wxyz(bone.orientation)
 
         @body.on_update
         def _(event: viser.TransformControlsEvent) -> None:
             orientation = rotation.normalized(np.array(body.wxyz)[XYZW])
-            position = np.array(body.position) + rotation.rotate(orientation, arm)
+            position = np.array(body.position)
+            if self.snap:
+                orientation = snapping.snapped_orientation(orientation, bone.orientation)
+                position = snapping.snapped_position(position, at, bone.orientation)
+            position = position + rotation.rotate(orientation, arm)
             frame.position, frame.wxyz = position, _wxyz(orientation)
             if event.phase == 'end':
                 if rotation.angle_between(orientation, bone.orientation) < TOLERANCE:
                     orientation = np.array(bone.orientation)
-                self._on_pose(_unless_unchanged(position, bone.position), orientation)
+                position = _unless_unchanged(position, bone.position)
+                if np.any(position != bone.position) or np.any(orientation != bone.orientation):
+                    self._on_pose(position, orientation)
+                elif np.any(body.position != np.array(at)) or np.any(body.wxyz != start):
+                    self.reset()
 
     def _add_size(self, bone: Bone) -> None:
         # Cylinders and capsules have equal x and y, spheres equal x, y and z.
@@ -127,7 +161,9 @@ class Handles:
             if event.phase == 'end':
                 x, y, z = size.position
                 new = np.array((x, y if active[1] else x, z if active[2] else x))
-                self._on_size(_unless_unchanged(new, half))
+                new = _unless_unchanged(new, half)
+                if np.any(new != half):
+                    self._on_size(snapping.snapped_half_extents(new, half) if self.snap else new)
 
 
 def _lift(scene: Scene, placement: Placement) -> np.ndarray:

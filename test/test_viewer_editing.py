@@ -1,0 +1,197 @@
+"""The editor in headless Chromium: keys, fields and handles as a user has them."""
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from browser import chromium, opened, serving
+
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.viewer.editor import changes
+
+SCENE = load_scene('drop')
+START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+BONE = 'left_shin'
+NUMBERS = itertools.count()
+
+
+@pytest.fixture(scope='module')
+def view(tmp_path_factory):
+    """The page at the scene's start, paused; its folder as an attribute."""
+    folder = tmp_path_factory.mktemp('editing')
+    with (chromium() as context, serving('--port', '0', '--scene', 'drop', '--folder',
+                                         str(folder)) as url,
+          opened(context, url, SCENE, {'width': 1280, 'height': 800}, first=True) as view):
+        view.folder = folder
+        view.hold_at(SCENE, START)
+        yield view
+
+
+def saved(view):
+    """The scene as the page saves it."""
+    name = f'edited_{next(NUMBERS)}'
+    view.field('file').fill(name)
+    view.press('Save')
+    view.see(f'saved {name}.yaml')
+    return load_scene(str(view.folder / f'{name}.yaml'))
+
+
+def choose(view, name):
+    """Choose a bone by a click on it, at the start."""
+    index = SCENE.bone_index(name)
+    view.page.mouse.click(*view.pixels(START[index:index + 1])[0])
+    view.wait(lambda: view.field('bone').input_value() == name
+              and float(view.field('mass, kg').input_value()) == SCENE.bones[index].mass)
+
+
+FOCUSED = """() => document.activeElement?.closest('.mantine-Flex-root')
+    ?.querySelector('label')?.textContent ?? ''"""
+"""Label of the field that has the focus."""
+
+
+def tab_to(view, label):
+    """Press Tab until the field beside a label has the focus."""
+    for _ in range(60):
+        view.key('Tab')
+        if view.page.evaluate(FOCUSED) == label:
+            return
+    raise AssertionError(label)
+
+
+TYPED = {'size, m': '0.08 0.08 0.4', 'mass, kg': '3.5', 'inertia, kg m²': '0.1 0.1 0.05',
+         'position, m': '0 0.1 0.31', 'rotation, °': '0 0 30', 'friction': '0.7',
+         'rolling, m': '0.01', 'restitution': '0.25', 'colour': 'rebeccapurple',
+         'anchor, m': '0 0.1 0.55', 'limits 1, °': '-5 100', 'damping': '0.5'}
+"""Twelve fields in the order of the form, each as it is typed."""
+
+
+MEANT = [0.08, 0.08, 0.4, 3.5, 0.1, 0.1, 0.05, 0, 0.1, 0.31, 0, 0, np.sin(np.radians(15)),
+         np.cos(np.radians(15)), 0.7, 0.01, 0.25, 0.4, 0.2, 0.6, 0, 0.1, 0.55,
+         *np.radians((-5, 100)), 0.5]
+"""Their numbers in the scene; an angle as a quaternion, a colour from 0 to 1."""
+
+
+def numbers(scene):
+    """What those fields are in a scene."""
+    (_, bone), joint = changes.find(scene, BONE), changes.joint_of(scene, BONE)
+    return [*bone.shape.size, bone.mass, *(bone.moments or ()), *bone.position, *bone.orientation,
+            bone.friction, bone.rolling_friction, bone.restitution, *(bone.color or ())[:3],
+            *joint.anchor, *joint.limits[0], joint.damping]
+
+
+def test_ten_fields_by_keyboard_alone(view):
+    """Tab, type, Enter, without a pause; each is a step that can be undone."""
+    view.tab('Edit')
+    choose(view, BONE)
+    for label, text in TYPED.items():
+        tab_to(view, label)
+        view.page.keyboard.type(text)
+        view.key('Enter')
+    view.see(f'Undo: numbers of {BONE}')
+    view.wait(lambda: numbers(saved(view)) == pytest.approx(MEANT, abs=1e-12))
+    for _ in TYPED:
+        view.press(f'Undo: numbers of {BONE}')
+    view.button('Undo').wait_for()
+    assert saved(view) == SCENE
+
+
+def test_a_refused_value_is_told_at_the_field_and_at_the_button(view):
+    """The field keeps its text and the focus; the next Enter applies what is right."""
+    view.tab('Edit')
+    choose(view, BONE)
+    field = view.field('friction')
+    field.focus()
+    field.fill('-1')
+    view.key('Enter')
+    view.see('friction must be')
+    told = view.page.get_by_text('Nothing is applied: see friction')
+    told.wait_for()
+    assert 0 < view.top(told) - view.top(view.button('Update')) < 60
+    assert field.input_value() == '-1' and view.page.evaluate(FOCUSED) == 'friction'
+    field.fill('0.5')
+    view.key('Enter')
+    told.wait_for(state='hidden')
+    assert changes.find(saved(view), BONE)[1].friction == 0.5
+    view.press(f'Undo: numbers of {BONE}')
+    view.button('Undo').wait_for()
+
+
+def test_what_is_typed_while_a_value_is_applied_stays(view):
+    """The scene restarts meanwhile, and the form is filled anew."""
+    view.tab('Edit')
+    choose(view, BONE)
+    mass, friction = view.field('mass, kg'), view.field('friction')
+    friction.fill('0.7')
+    mass.fill('4')
+    mass.press('Enter')
+    mass.fill('4.25')
+    view.see(f'Undo: numbers of {BONE}')
+    bone = changes.find(saved(view), BONE)[1]
+    assert (bone.mass, bone.friction) == (4, 0.7)
+    assert mass.input_value() == '4.25'
+    view.press(f'Undo: numbers of {BONE}')
+    view.wait(lambda: float(mass.input_value()) == SCENE.bones[SCENE.bone_index(BONE)].mass)
+
+
+def banner(view):
+    return view.page.locator('.ragdoll-edit-banner')
+
+
+def mode(view):
+    """What the banner says that handles do."""
+    return banner(view).locator('[aria-pressed=true]').text_content().split()[0]
+
+
+def run(view):
+    """End editing, and go back to the start."""
+    view.key(' ')
+    banner(view).wait_for(state='detached')
+    view.tab('Play')
+    view.hold_at(SCENE, START)
+
+
+def test_e_edits_and_w_e_r_choose_what_handles_do(view):
+    """E opens the tab and starts editing, which a banner says; there it turns."""
+    view.tab('Play')
+    view.page.mouse.click(20, 700)
+    view.key('e')
+    banner(view).wait_for()
+    view.button('Run').first.wait_for()
+    assert mode(view) == 'Move'
+    for key, name in (('e', 'Turn'), ('r', 'Size'), ('w', 'Move'), ('e', 'Turn')):
+        view.key(key)
+        view.wait(lambda name=name: mode(view) == name)
+    banner(view).get_by_role('button', name='Size').click()
+    view.wait(lambda: mode(view) == 'Size')
+    run(view)
+
+
+def test_keys_mean_no_two_things(view):
+    """In a field E is a letter; where the tab is closed E opens it, R resets and W flies."""
+    view.tab('Play')
+    view.page.mouse.click(20, 700)
+    view.key('e')
+    banner(view).wait_for()
+    view.key('w')
+    view.wait(lambda: mode(view) == 'Move')
+    choose(view, BONE)
+    view.field('mass, kg').fill('')
+    view.page.keyboard.type('5e0')
+    assert view.field('mass, kg').input_value() == '5e0'
+    view.page.mouse.click(20, 700)
+    view.tab('Play')
+    view.page.mouse.click(20, 700)
+    before = view.pixels(START)
+    view.key('r')
+    view.page.keyboard.down('w')
+    view.wait(lambda: abs(view.pixels(START) - before).max() > 5)
+    view.page.keyboard.up('w')
+    view.key('e')
+    view.button('Run').first.wait_for()
+    assert mode(view) == 'Move'
+    banner(view).get_by_role('button', name='Run').click()
+    banner(view).wait_for(state='detached')
+    view.wait(lambda: abs(view.bodies(SCENE) - START).max() > 0.01)
+    view.tab('Play')
+    view.hold_at(SCENE, START)
