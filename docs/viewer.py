@@ -43,7 +43,7 @@ def page(context: browser.BrowserContext, scene: str) -> Iterator[browser.View]:
         # The first fall begins once the page has drawn its start.
         view.button('Pause').wait_for()
         view.key(' ')
-        view.button('Resume').wait_for()
+        view.button('Play').wait_for()
         view.key('r')
         shot(view)
         yield view
@@ -89,7 +89,7 @@ def grab(context: browser.BrowserContext, folder: Path) -> None:
         view.key(' ')
         view.page.wait_for_timeout(3000)
         view.key(' ')
-        view.button('Resume').wait_for()
+        view.button('Play').wait_for()
         mouse.move(*view.pixels([np.add(at, (0, -1.0, 0.5))])[0], steps=5)
         shot(view)
         step(view, 9)

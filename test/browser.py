@@ -171,7 +171,7 @@ class View:
         """Pause at the start, where the bones are at (n, 3) m, as the page draws it."""
         if self.button('Pause').count():
             self.key(' ')
-            self.button('Resume').wait_for()
+            self.button('Play').wait_for()
         self.key('r')
         self.wait(lambda: abs(self.bodies(scene) - start).max() < 1e-6)
 

@@ -22,7 +22,7 @@ class PageClient:
     """One open page. It counts as open once its camera has been told."""
 
     def __init__(self, port, position=(4.2, -1.2, 1.5), look_at=(0.0, 0.0, 0.8)):
-        self.bytes = self.windows = 0
+        self.bytes = self.windows = self._events = 0
         self.arrivals, self.sizes = [], []
         self._socket = None
         self._ready = threading.Event()
@@ -58,6 +58,11 @@ class PageClient:
     def update(self, handle, value):
         """Change a value in the panel."""
         self.send(_messages.GuiUpdateMessage(handle._impl.uuid, {'value': value}))
+
+    def steer(self, page, text):
+        """Use the transport bar: a word of transport.js, and a number if it needs one."""
+        self._events += 1
+        self.update(page.transport.events, f'{self._events} {text}')
 
     def press(self, page, label):
         """Press the hotkey of a page's command."""

@@ -106,8 +106,8 @@ def test_editing_ends_where_the_page_goes_on(page, browser):
     page.editor.select('head')
     browser.press_button(page.editor.panel.edit)
     wait(lambda: page.editor.handles.body is not None
-         and page.controls.pause.label == 'Resume')
-    browser.press_button(page.controls.pause)
+         and not page.transport.shown.playing)
+    browser.press(page, 'Play or pause')
     wait(lambda: page.editor.handles.body is None)
     assert not page.editor.editing
 

@@ -128,9 +128,9 @@ def test_a_page_whose_line_is_cut_lets_go_and_comes_back_to_what_is(browser, vie
                                   for _, message in list(feedback)))
             view.wait(lambda: torso(poses[-1][1])[2] < 0.5)
             view.key(' ')
-            view.button('Resume').wait_for()
+            view.button('Play').wait_for()
             network.come_back()
-            far.button('Resume').wait_for()
+            far.button('Play').wait_for()
             far.wait(lambda: far.bodies(SCENE) is not None and abs(
                 far.bodies(SCENE)[TORSO] - torso(poses[-1][1])).max() < 1e-6)
             far.page.mouse.up()

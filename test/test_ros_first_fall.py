@@ -47,11 +47,11 @@ def test_the_first_fall_begins_when_the_first_page_shows_it(browser, size, delay
         with opened(browser, url, SCENE, SIZES[size]) as view:
             assert abs(view.bodies(SCENE) - START).max() < 0.3
             view.wait(lambda: abs(view.bodies(SCENE)[:, 2] - START[:, 2]).min() > 0.1)
-            view.button('Again').wait_for()
+            view.page.get_by_title('At rest').wait_for()
             lies = view.bodies(SCENE)
             assert lies[:, 2].max() < 0.6
             with opened(browser, url, SCENE, SIZES[size]) as other:
-                other.button('Again').wait_for()
+                other.page.get_by_title('At rest').wait_for()
                 assert abs(other.bodies(SCENE) - lies).max() < 0.01
 
 

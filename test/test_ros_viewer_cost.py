@@ -74,7 +74,7 @@ def test_a_minute_of_scrubbing_costs_the_node_nothing(ros):
             count = 0
             while not stop.wait(0.05):
                 count += 1
-                client.update(page.timeline.slider, round(count * 0.07 % 5, 3))
+                client.steer(page, f'position {round(count * 0.07 % 5, 3)}')
 
         hand = threading.Thread(target=scrub)
         hand.start()

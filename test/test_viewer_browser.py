@@ -10,7 +10,7 @@ import fit_rigs
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from browser import SHARPNESS, SIZE, View, chromium, opened, serving
+from browser import SHARPNESS, View, chromium, opened, serving
 from conftest import ROOT
 from test_fit_broken import BROKEN
 
@@ -133,7 +133,7 @@ def test_the_camera_follows_on_demand(view):
     go_on(view)
     view.wait(lambda: view.bodies(SCENE)[0][1] < -0.2)
     view.key(' ')
-    view.button('Resume').wait_for()
+    view.button('Play').wait_for()
     view.wait(lambda: off() < 2)
     view.hold_at(SCENE, START)
     view.wait(lambda: off() < 2)
@@ -160,9 +160,15 @@ def test_two_pages_show_and_steer_the_same(browser, url, view):
             each.wait(lambda each=each: far(each, START, 0.1))
 
 
+def open_recording(view):
+    """Open the folder with what saves a run."""
+    if not view.button('Screenshot').count():
+        view.page.get_by_text('Recording', exact=True).click()
+
+
 def test_a_run_is_recorded(view, states, tmp_path):
     """From the start on, each recorded pose is the simulation's at that tick, to the bit."""
-    view.page.get_by_text('Recording', exact=True).click()
+    open_recording(view)
     view.hold_at(SCENE, START)
     view.press('Record')
     go_on(view)
@@ -186,6 +192,7 @@ def test_all_of_the_timeline_is_saved(view, states, tmp_path):
     view.hold_at(SCENE, START)
     go_on(view)
     view.wait(lambda: far(view, START, 0.1))
+    open_recording(view)
     with view.page.expect_download() as download:
         view.press('Export')
     download.value.save_as(tmp_path / 'run.zip')
@@ -203,7 +210,7 @@ def test_a_time_is_typed(view):
     view.tab('Play')
     view.hold_at(SCENE, START)
     go_on(view)
-    field = view.field('Time')
+    field = view.page.get_by_label('Time', exact=True)
     for text in ('0.5', '0,25'):
         view.press('Live')
         view.wait(lambda: float(field.input_value()) > 1)
@@ -220,6 +227,7 @@ def test_a_time_is_typed(view):
         assert field.input_value() == text and (view.bodies(SCENE) == seen).all()
         view.page.mouse.click(20, 20)
     view.press('Live')
+    view.button('Pause').wait_for()
 
 
 @pytest.mark.slow  # test_viewer_playback.py plays without a browser
@@ -245,13 +253,14 @@ def test_the_view_is_saved_as_png(view, tmp_path):
     Viser draws three quarters of the pixels each way at least where a page is slow.
     """
     view.hold_at(SCENE, START)
+    open_recording(view)
     with view.page.expect_download() as download:
         view.press('Screenshot')
     download.value.save_as(tmp_path / 'view.png')
     picture = iio.imread(tmp_path / 'view.png')
-    share = picture.shape[0] / SIZE['height']
+    canvas = view.page.locator('canvas').first.bounding_box()
+    share, width = picture.shape[0] / canvas['height'], canvas['width']
     x, y = (view.pixels(START[:1])[0] * share).astype(int)
-    width = view.page.locator('canvas').first.bounding_box()['width']
     assert share >= 0.75 * SHARPNESS and picture.shape[2] == 3
     # Viser rounds both sides to pixels, and draws any share of them where a page is slow.
     assert picture.shape[1] == pytest.approx(share * width, abs=1)

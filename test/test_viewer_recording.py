@@ -221,7 +221,7 @@ def panel():
     viser = pytest.importorskip('viser')
     from ragdoll_ros.viewer.recording_panel import RecordingPanel
     server = viser.ViserServer('127.0.0.1', 0, verbose=False)
-    panel = RecordingPanel(server)
+    panel = RecordingPanel(server, lambda: None)
     yield panel, panel.button, lambda: panel.toggle(None)
     server.stop()
 

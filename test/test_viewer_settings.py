@@ -129,7 +129,7 @@ def test_the_accuracy_by_the_dropdown_and_its_price(page):
 def test_a_factor_is_typed_digit_by_digit(page, capfd):
     """0, which is none, is passed over on the way to 0.5."""
     for value in (0, 0.5):
-        page.client.update(page.controls.real_time_factor, value)
+        page.client.steer(page, f'speed {value}')
     wait(lambda: page.source.status.real_time_factor == 0.5)
     assert 'Traceback' not in capfd.readouterr().err and not page.source.status.problem
 

@@ -20,7 +20,7 @@ from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.mcap_file import load_recording
 from ragdoll_ros.viewer.drawing.plots import thinned
 from ragdoll_ros.viewer.sources.node.source import NodeSource
-from ragdoll_ros.viewer.timeline.timeline import export_zip
+from ragdoll_ros.viewer.timeline.export import export_zip
 
 SCENES = ('drop', 'flight', 'ponytail')
 

@@ -23,10 +23,11 @@ from ragdoll_ros.recordings.save import FORMATS
 from ragdoll_ros.viewer.sources.playback import PlaybackSource
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 from ragdoll_ros.viewer.sources.source import Frame
-from ragdoll_ros.viewer.timeline import timeline
+from ragdoll_ros.viewer.timeline.export import export_zip
 from ragdoll_ros.viewer.timeline.frame_buffer import MAX_NUMBERS, SPAN, FrameBuffer
 from ragdoll_ros.viewer.timeline.playhead import Playhead
 from ragdoll_ros.viewer.timeline.strip import WIDTH, strip
+from ragdoll_ros.viewer.timeline.transport import PERIOD
 
 DROP = load_scene('drop')
 
@@ -160,7 +161,7 @@ def test_what_was_is_drawn_while_the_doll_goes_on(states):
     with served(SimulationSource(DROP)) as page:
         client = page.open()
         wait(lambda: page.frame and page.frame.time > 1.0)
-        client.update(page.timeline.slider, 0.5)
+        client.steer(page, 'position 0.5')
         wait(lambda: not page.timeline.is_live)
         clip = page.timeline.clip
         index = clip.index(0.5)
@@ -172,57 +173,54 @@ def test_what_was_is_drawn_while_the_doll_goes_on(states):
         wait(lambda: page.source.frame.time > before + 0.3)
         assert page.frame is seen and page.timeline.clip is clip
         assert clip.duration < page.source.frame.time
-        client.press(page, 'Next frame')
+        client.press(page, 'Step')
         wait(lambda: page.frame is following)
-        client.press(page, 'Previous frame')
+        client.press(page, 'Step back')
         wait(lambda: page.frame is seen)
         client.press(page, 'Play or pause')
         wait(lambda: page.frame.time > seen.time + 0.2)
         assert not page.timeline.is_live
-        client.update(page.timeline.buttons, 'Live')
+        client.press(page, 'Live')
         wait(lambda: page.timeline.is_live and page.frame is page.source.frame)
 
 
 def test_what_a_slider_is_put_to_is_looked_at():
-    """Though viser's threads are busy meanwhile, and the page moves the slider along; and it is
-    sent back, as the page may show where it was moved to.
-    """
+    """Though viser's threads are busy meanwhile, and the page moves the slider along."""
     with served(SimulationSource(DROP)) as page:
-        client, slider = page.open(), page.timeline.slider
-        wait(lambda: slider.value > 0.8)
+        client, shown = page.open(), lambda: page.transport.shown
+        wait(lambda: shown() and shown().position > 0.8)
         free = threading.Event()
         for _ in range(100):
             page.server.gui._thread_executor.submit(free.wait, 60)
         try:
-            client.update(slider, 0.3)
-            wait(lambda: slider.value == 0.3)
+            client.steer(page, 'position 0.3')
+            wait(lambda: shown().position == 0.3)
             before = page.source.frame.time
-            wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
+            wait(lambda: page.source.frame.time > before + 2 * PERIOD)
         finally:
             free.set()
         wait(lambda: not page.timeline.is_live)
-        assert page.timeline.shown_instant(time.monotonic()) == slider.value == 0.3
+        assert page.timeline.shown_instant(time.monotonic()) == shown().position == 0.3
 
 
 def test_time_stands_while_one_types_it():
     """From the click into the field on; and goes on if nothing was typed."""
     with served(SimulationSource(DROP)) as page:
-        client, slider = page.open(), page.timeline.slider
-        wait(lambda: slider.value > 0.8)
-        told = page.timeline.focus_events
-        client.update(told, '0 focus')
+        client, position = page.open(), lambda: page.transport.shown.position
+        wait(lambda: page.transport.shown and position() > 0.8)
+        client.steer(page, 'focus')
+        wait(lambda: not page.timeline.is_live and not page.transport.shown.live)
+        shown, before = position(), page.source.frame.time
+        wait(lambda: page.source.frame.time > before + 2 * PERIOD)
+        assert position() == shown == round(page.timeline.shown_instant(time.monotonic()), 3)
+        client.steer(page, 'blur')
+        wait(lambda: page.timeline.is_live and position() > shown)
+        client.steer(page, 'focus')
         wait(lambda: not page.timeline.is_live)
-        shown, before = slider.value, page.source.frame.time
-        wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
-        assert slider.value == shown == page.timeline.shown_instant(time.monotonic())
-        client.update(told, '1 blur')
-        wait(lambda: page.timeline.is_live and slider.value > shown)
-        client.update(told, '2 focus')
-        wait(lambda: not page.timeline.is_live)
-        client.update(slider, 0.5)
-        client.update(told, '3 blur')
+        client.steer(page, 'position 0.5')
+        client.steer(page, 'blur')
         before = page.source.frame.time
-        wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
+        wait(lambda: page.source.frame.time > before + 2 * PERIOD)
         assert page.timeline.shown_instant(time.monotonic()) == 0.5
 
 
@@ -230,13 +228,13 @@ def test_time_goes_on_when_the_page_that_types_it_closes():
     """And not when another one leaves its field."""
     with served(SimulationSource(DROP)) as page:
         one, other = page.open(), page.open()
-        wait(lambda: page.timeline.slider.value > 0)
-        one.update(page.timeline.focus_events, '0 focus')
+        wait(lambda: page.transport.shown and page.transport.shown.position > 0)
+        one.steer(page, 'focus')
         wait(lambda: not page.timeline.is_live)
-        other.update(page.timeline.focus_events, '0 blur')
+        other.steer(page, 'blur')
         # Comes after that by the same way.
-        other.update(page.controls.real_time_factor, 0.5)
-        wait(lambda: page.source.status.real_time_factor == 0.5)
+        other.steer(page, 'speed 0.5')
+        wait(lambda: page.timeline.speed == 0.5)
         assert not page.timeline.is_live
         one.close()
         wait(lambda: page.timeline.is_live)
@@ -247,7 +245,7 @@ def test_nothing_is_taken_hold_of_in_the_past_and_a_reset_leads_back():
         client = page.open()
         wait(lambda: page.frame and page.frame.time > 0.3)
         assert page._grabbable_frame() is not None
-        client.update(page.timeline.slider, 0.1)
+        client.steer(page, 'position 0.1')
         wait(lambda: not page.timeline.is_live)
         assert page._grabbable_frame() is None
         client.press(page, 'Reset')
@@ -260,9 +258,9 @@ def test_plots_follow_the_timeline():
         client = page.open()
         ends = lambda: page.plots.gap.handle.data[0][-1]  # noqa: E731
         wait(lambda: len(page.plots.gap.handle.data[0]) > 6)
-        client.update(page.timeline.slider, 0.8)
+        client.steer(page, 'position 0.8')
         wait(lambda: not page.timeline.is_live and ends() <= 0.85)
-        client.update(page.timeline.buttons, 'Live')
+        client.press(page, 'Live')
         wait(lambda: ends() > 1.0)
         client.press(page, 'Reset')
         wait(lambda: ends() < 1.0 and page.frame.time < 1.0)
@@ -279,7 +277,7 @@ def test_plots_begin_anew_with_another_scene():
         wait(lambda: page.frame.scene.name == 'flight' and page.frame.time > 1)
         assert all(handle.visible for handle in handles)
         assert max(handle.data[0][-1] for handle in handles) <= page.frame.time
-        client.update(page.timeline.slider, 0.01)
+        client.steer(page, 'position 0.01')
         wait(lambda: not page.timeline.is_live)
         wait(lambda: all(handle.data[0][-1] < 0.5 or not handle.visible for handle in handles))
 
@@ -311,7 +309,7 @@ def test_a_file_has_the_same_timeline(states):
         assert clip.duration == pytest.approx(1.19) and 0 < clip.touching.sum() < 120
         touched = next(k for k, state in enumerate(states) if state.positions[:, 2].min() < 0.11)
         assert abs(np.flatnonzero(clip.touching)[0] - touched) < 10
-        client.update(page.timeline.slider, 1.0)
+        client.steer(page, 'position 1.0')
         wait(lambda: page.frame.time == 1.0 and shows(page, states[100]))
 
 
@@ -320,10 +318,10 @@ def test_save_this_has_the_run_in_every_format(states):
     with served(SimulationSource(DROP)) as page:
         client = page.open()
         wait(lambda: page.frame and page.frame.time > 0.5)
-        client.update(page.timeline.slider, 0.2)
+        client.steer(page, 'position 0.2')
         wait(lambda: not page.timeline.is_live)
         clip = page.timeline.clip
-        content = timeline.export_zip(clip.recording())
+        content = export_zip(clip.recording())
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         assert archive.namelist() == [f'run{suffix}' for suffix in FORMATS]
         table = np.genfromtxt(io.BytesIO(archive.read('run.csv')), delimiter=',', skip_header=1)

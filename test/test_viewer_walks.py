@@ -110,7 +110,7 @@ def test_home_is_found_from_everywhere(view, seed):
     for _ in range(ACTS):
         act(view, random)
     view.page.evaluate('document.activeElement.blur()')
-    view.wait(lambda: view.button('Pause').count() or view.button('Resume').count())
+    view.wait(lambda: view.button('Pause').count() or view.button('Play').count())
     view.key('h')
     view.wait(lambda: at_home(view))
 
@@ -122,6 +122,6 @@ def at_home(view):
     if view.button('Pause').count():
         view.key(' ')
         with suppress(AssertionError):
-            view.wait(view.button('Resume').count, 5)
+            view.wait(view.button('Play').count, 5)
         view.key('h')
     return in_sight(view)

@@ -26,6 +26,7 @@ from .settings_panel import SettingsPanel
 from .sources.source import Frame, RequestedData, Source, SourceStatus
 from .start_when_visible import StartWhenVisible
 from .timeline.timeline import Timeline
+from .timeline.transport import Transport
 from .widgets.form import GREY, RED, colored
 
 PERIOD = 1 / 60
@@ -39,8 +40,8 @@ SIMULATION_HINT = ('<span class="ragdoll-mouse">Drag a bone. Arrow keys push, ta
                    'view.</span><span class="ragdoll-touch">Drag a bone with one finger. The '
                    'arrows below push; a tap on a bone chooses which. Two fingers move the view.'
                    '</span>')
-RECORDING_HINT = ('A recorded run. Space pauses, R restarts, drag Time or press J, K, L to look '
-                  'back, H shows the home view.')
+RECORDING_HINT = ('A recorded run. Space pauses, R restarts, drag the bar below the picture '
+                  'or press , and . to step, H shows the home view.')
 
 DISCONNECTED = ('The viewer that served this page has ended, or cannot be reached: start it again '
                 'at the same port, and the page will reconnect by itself.')
@@ -74,6 +75,8 @@ class Page:
                      script('upload_notices.js'), script('decimal_comma.js')):
             server.gui.add_html(html)
         self._edit_banner = Banner(server.gui)
+        self.timeline = Timeline(source)
+        self.transport = Transport(server, source, self.timeline)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
@@ -81,15 +84,16 @@ class Page:
             self.display = DisplayOptions(server)
             self.settings = SettingsPanel(server, source)
             self.display.on_home(lambda client: self.cameras.go_home(client))
-            self.timeline = Timeline(server, source)
-            self._recording = RecordingPanel(server)
+            self._recording = RecordingPanel(server, lambda: self.timeline.clip)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
         self.cameras = Cameras(server)
         self._auto_follow = AutoFollow(self.display.follow)
         self._hover = Hover(server)
-        self._pointer = Pointer(source, self._grabbable_frame, self._select)
+        self._pointer = Pointer(source, self._grabbable_frame, self._select, self.transport.refuse)
+        self.controls.pushes.may_push = lambda: self.timeline.is_live
+        self.controls.pushes.refuse = self.transport.refuse
 
     def run(self, stop: threading.Event) -> None:
         """Draw until ``stop`` is set."""
@@ -145,9 +149,9 @@ class Page:
                 self.cameras.show(frame)
                 self._follow_if_it_leaves(frame)
         bone = self.controls.pushes.bone
+        self.transport.update(self.server.get_clients(), live, frame, status, now)
         self.cameras.follow(frame, bone, now, self.display.follow.value)
         self._hover.show(frame, self.controls.pushes.motion, now)
-        self.controls.show_rest(live, status.paused, now)
         self.settings.show(status, live.scene, now)
 
     def _follow_if_it_leaves(self, frame: Frame) -> None:
@@ -189,7 +193,7 @@ class Page:
         with self._edit_tab:
             self.editor = Editor(self.server, scene, self.source.set_scene, self.source.pause,
                                  self._edit_banner, self._folder)
-        self.controls.before_step = self.editor.leave
+        self.transport.before_step = self.editor.leave
 
     def _show_messages(self, problem: str, note: str) -> None:
         notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]

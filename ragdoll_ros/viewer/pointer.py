@@ -34,8 +34,11 @@ class Pointer:
     """
 
     def __init__(self, source: Source, grabbable_frame: Callable[[], Frame | None],
-                 select: Callable[[str], None]) -> None:
+                 select: Callable[[str], None],
+                 refuse: Callable[[viser.ClientHandle], None] = lambda _: None) -> None:
         self._source, self._frame, self._select = source, grabbable_frame, select
+        self._refuse = refuse
+        """Tells a page why it cannot grab anything."""
         self._distances: dict[int, float] = {}
         """Distance from the camera, m, of the point that each client holds."""
         self._watches: dict[int, asyncio.Task] = {}
@@ -74,6 +77,7 @@ class Pointer:
     def _grab(self, event: viser.SceneNodeDragEvent, bone: int, point: np.ndarray) -> None:
         frame = self._frame()
         if frame is None:
+            self._refuse(event.client)
             return
         eye = event.client.camera.position
         self._distances[event.client_id] = float(np.linalg.norm(point - eye))

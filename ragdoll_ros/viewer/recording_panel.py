@@ -1,8 +1,9 @@
-"""Buttons that record the run as MCAP and save the view as PNG."""
+"""Buttons that record the run, save the view, and export the timeline."""
 from __future__ import annotations
 
 import importlib.util
 import threading
+from collections.abc import Callable
 
 import imageio.v3 as iio
 import numpy as np
@@ -11,6 +12,8 @@ import viser
 from ..recordings.mcap_file import recording_bytes
 from ..recordings.recording import RecordedPose, Recorder
 from .sources.source import Frame
+from .timeline.export import export_zip
+from .timeline.frame_buffer import Clip
 
 MAX_NUMBERS = 5_000_000
 """In one recording: 40 MB as MCAP; 20 minutes of ten bones at 60 Hz, half a minute of 500."""
@@ -26,12 +29,14 @@ SCENE_CHANGED, FULL = 'Download (scene has changed)', 'Download (recording is fu
 
 
 class RecordingPanel:
-    """Two buttons in the panel; `add` takes the frames and may be called from any thread.
+    """Three buttons in the panel; `add` takes the frames and may be called from any thread.
 
     All pages share one recording; the page that stops it gets the file.
     """
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    def __init__(self, server: viser.ViserServer, clip: Callable[[], Clip | None]) -> None:
+        self._clip = clip
+        """What is exported: the whole timeline."""
         self.recorder: Recorder | None = None
         """Frames recorded so far; None if there is no recording."""
         self._ended = False
@@ -43,7 +48,10 @@ class RecordingPanel:
                 if CAN_WRITE else 'Requires mcap: pip install mcap')
             screenshot = server.gui.add_button('Screenshot', icon=viser.Icon.CAMERA,
                                                hint='this view as ragdoll.png')
+            export = server.gui.add_button('Export', icon=viser.Icon.DOWNLOAD, hint='the whole '
+                                           'timeline as run.zip: MCAP, glTF, BVH, CSV')
         self._frame: Frame | None = None
+        export.on_click(self._send_export)
         self.button.on_click(lambda event: self.toggle(event.client))
         screenshot.on_click(_send_screenshot)
 
@@ -86,6 +94,13 @@ class RecordingPanel:
         if recorder is not None and client is not None:
             content = recording_bytes(recorder.recording())
             client.send_file_download('run.mcap', content, save_immediately=True)
+
+    def _send_export(self, event: viser.GuiEvent) -> None:
+        """Send the whole timeline to the page that asked for it."""
+        clip = self._clip()
+        if clip is not None and event.client is not None:
+            event.client.send_file_download('run.zip', export_zip(clip.recording()),
+                                            save_immediately=True)
 
 
 def _send_screenshot(event: viser.GuiEvent) -> None:

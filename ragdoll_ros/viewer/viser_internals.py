@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import viser
+from viser import _messages
 
 VERSIONS = '>=1.1.1,<1.2'
 
@@ -24,6 +25,11 @@ CLIENT_PACKAGES = {'@mantine/core': '^9.', '@mantine/notifications': '^9.',
 def handle_id(handle: viser.GuiInputHandle) -> str:
     """Id of a widget in messages and in the page's HTML."""
     return handle._impl.uuid
+
+
+def run_script(client: viser.ClientHandle, source: str) -> None:
+    """Run JavaScript on a page, whether its panel is open or not."""
+    client._websock_connection.queue_message(_messages.RunJavascriptMessage(source))
 
 
 def connections(client: viser.ClientHandle) -> Mapping[int, Any]:

@@ -40,12 +40,14 @@ def style(name: str, **properties: str) -> str:
 
 
 def add_listener(gui: viser.GuiApi, name: str, file: str, on_event: Callable[[int, str], None],
-                 widget: viser.GuiInputHandle | None = None) -> viser.GuiInputHandle[str]:
+                 widget: viser.GuiInputHandle | None = None,
+                 **constants: str) -> viser.GuiInputHandle[str]:
     """Run the ``listen(send, isTyped)`` of a script ``file`` on all pages; see client_events.js.
 
     ``on_event`` gets a page's client_id and what it sends, in viser's thread, so in order with all
     else that pages send. In the script, `isTyped(input)` tells whether an input belongs to
-    ``widget``, which has a label. Returns the hidden text field whose values carry the events.
+    ``widget``, which has a label. ``constants``: as in `script`. Returns the hidden text field
+    whose values carry the events.
     """
     field = gui.add_text(name, '', visible=False)
 
@@ -54,5 +56,5 @@ def add_listener(gui: viser.GuiApi, name: str, file: str, on_event: Callable[[in
         on_event(event.client_id, event.target.value.partition(' ')[2])
 
     gui.add_html(script(file, 'client_events.js', NAME=name, FIELD=handle_id(field),
-                        WIDGET=handle_id(widget) if widget is not None else ''))
+                        WIDGET=handle_id(widget) if widget is not None else '', **constants))
     return field

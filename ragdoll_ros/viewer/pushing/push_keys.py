@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import viser
@@ -43,6 +43,9 @@ class PushKeys:
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self.motion = Motion()
+        self.may_push: Callable[[], bool] = lambda: True
+        self.refuse: Callable[[viser.ClientHandle | None], None] = lambda _: None
+        """Called with a page that pushes while it may not."""
         self._server, self._source = server, source
         self._lock = threading.Lock()
         self._pressed: dict[int, PressedKeys] = {}
@@ -109,7 +112,7 @@ class PushKeys:
         with self._lock:
             clients = self._server.get_clients()
             held = {page: arrows for page, pressed in self._pressed.items()
-                    if (arrows := pressed.held(now)) and page in clients}
+                    if (arrows := pressed.held(now)) and page in clients and self.may_push()}
             if held and now >= self._next_repeat:
                 self._next_repeat = now + REPEAT_PERIOD
                 self._push_along(sum(self._direction(clients[page], arrows)
@@ -134,6 +137,9 @@ class PushKeys:
         return np.sum([directions[arrow] for arrow in arrows], axis=0)
 
     def _tap(self, client: viser.ClientHandle | None, arrows: Iterable[str]) -> None:
+        if not self.may_push():
+            self.refuse(client)
+            return
         self._push_along(self._direction(client, arrows), TAP, TAP)
 
     def _push_along(self, direction: np.ndarray, response: float, duration: float) -> None:

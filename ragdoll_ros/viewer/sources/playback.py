@@ -84,6 +84,11 @@ class PlaybackSource(Source):
         with self._lock:
             self._continue_from(0.0)
 
+    def seek(self, instant: float) -> None:
+        with self._lock:
+            self._paused = True
+            self._continue_from(min(max(instant, 0.0), self._recording.duration))
+
     def set_real_time_factor(self, factor: float) -> None:
         errors.check_range('real_time_factor', factor, *REAL_TIME_FACTORS)
         with self._lock:

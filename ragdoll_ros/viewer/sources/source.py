@@ -114,6 +114,9 @@ class Source(Protocol):
     def frame_at(self, instant: float) -> Frame:
         """Frame of the recording at an instant, s."""
 
+    def seek(self, instant: float) -> None:
+        """Pause the recording at an instant, s."""
+
     @property
     def status(self) -> SourceStatus:
         """The current status."""

@@ -91,6 +91,11 @@ class FrameBuffer:
         """Instant of the newest frame, s."""
         return self._frames[-1].time if self._frames else 0.0
 
+    @property
+    def duration(self) -> float:
+        """Time from the oldest frame to the newest, s."""
+        return self.end - self._frames[0].time if self._frames else 0.0
+
     def add(self, frame: Frame) -> TimelineFrame | None:
         """Keep a frame, which must not be changed later; None if its instant is the last one's."""
         last = self._frames[-1] if self._frames else None

@@ -11,12 +11,12 @@ class Playhead:
     def __init__(self, clip: Clip, time: float, speed: float = 1.0) -> None:
         self.clip = clip
         self.is_playing = False
-        self._speed = speed
+        self.speed = speed
         self._time, self._since = time, 0.0
 
     def time(self, now: float) -> float:
         """Time since the clip's first instant, s; at most its duration."""
-        elapsed = (now - self._since) * self._speed if self.is_playing else 0.0
+        elapsed = (now - self._since) * self.speed if self.is_playing else 0.0
         return min(self._time + elapsed, self.clip.duration)
 
     def frame(self, now: float) -> Frame:
@@ -47,4 +47,4 @@ class Playhead:
     def set_speed(self, speed: float, now: float) -> None:
         """Set the speed from now on."""
         self.go_to(self.time(now), now)
-        self._speed = speed
+        self.speed = speed

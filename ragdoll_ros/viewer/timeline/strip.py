@@ -5,8 +5,8 @@ import numpy as np
 
 from .frame_buffer import Clip
 
-WIDTH = 300
-"""Columns: about the width of the panel in pixels."""
+WIDTH = 600
+"""Columns: about the width of the bar in pixels."""
 
 RED, YELLOW, GREY = '#e63219', '#f5be00', '#868e96'
 """Colours of arrows, of contacts and of resets."""
@@ -20,22 +20,24 @@ def strip(clip: Clip) -> str:
     columns = np.minimum((fraction * WIDTH).astype(int), WIDTH - 1)
     rows = [TRACK.format(width=WIDTH, top=top) for top in (0, 8)]
     for flags, top, color in ((clip.pushed, 0, RED), (clip.touching, 8, YELLOW)):
-        rows += [f'<rect x="{first}" y="{top}" width="{last - first}" height="6" fill="{color}"/>'
-                 for first, last in _runs(np.unique(columns[flags]))]
+        rows += [f'<rect x="{first}" y="{top}" width="{end - first}" height="6" fill="{color}"/>'
+                 for first, end in _runs(flags, columns)]
     rows += [f'<rect x="{column}" width="1" height="14" fill="{GREY}"/>'
              for column in np.unique(columns[clip.resets])]
     return (f'<svg viewBox="0 0 {WIDTH} 14" preserveAspectRatio="none" role="img" '
-            'aria-label="red: pushes; yellow: on the ground; grey: reset" '
-            'style="display:block;width:calc(100% - 1.5em);height:14px;margin:0 0.75em 0.5em">'
-            f'<title>red: pushes and hands; yellow: on the ground; grey: a reset</title>'
+            'aria-label="red: pushes and hands; yellow: on the ground; grey: a reset">'
             f'{"".join(rows)}</svg>')
 
 
-def _runs(columns: np.ndarray) -> list[tuple[int, int]]:
-    """Intervals [first, end) of consecutive columns."""
-    if not len(columns):
-        return []
-    ends = np.flatnonzero(np.diff(columns) > 1)
-    firsts = columns[np.concatenate([[0], ends + 1])]
-    lasts = columns[np.concatenate([ends, [len(columns) - 1]])] + 1
-    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
+def _runs(flags: np.ndarray, columns: np.ndarray) -> list[tuple[int, int]]:
+    """Intervals [first, end) of columns of flagged frames, each of which lasts until the next."""
+    changes = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
+    ends = np.append(columns, WIDTH)
+    found: list[tuple[int, int]] = []
+    for first, after in zip(np.flatnonzero(changes > 0), np.flatnonzero(changes < 0), strict=True):
+        start, end = int(columns[first]), int(max(ends[after], columns[first] + 1))
+        if found and start <= found[-1][1]:
+            found[-1] = found[-1][0], max(end, found[-1][1])
+        else:
+            found.append((start, end))
+    return found
