@@ -63,8 +63,8 @@ limits. ``angles``, ``u``, ``v`` (c,): the corners of a patch in order, see patc
 
 Island = collections.namedtuple(
     'Island', 'members label Y YT support place W G blocks rhs impulses free_velocity '
-    'start_velocity curvature correction soft velocity residual direction best active places '
-    'is_normal normal_rhs normal_impulses normal_row z z_direction anderson '
+    'start_velocity curvature correction soft velocity residual direction best step_start active '
+    'places is_normal normal_rhs normal_impulses normal_row z z_direction anderson '
     'bodies body_number elimination dof_place A B BY coupled phi local lu occurrence_start '
     'occurrences')
 """An island of m contacts (``members``) and their rows, and scratch to solve it.
@@ -147,6 +147,7 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         rhs=each_row(), impulses=each_row(), free_velocity=each_row(), start_velocity=each_row(),
         curvature=each_row(), correction=each_row(), soft=each_row(), velocity=each_row(),
         residual=each_row(), direction=each_row(), best=each_row(),
+        step_start=each_row(),
         active=np.zeros(2 * max(rows, 8)), places=np.zeros(max(rows, 8), np.int64),
         is_normal=np.zeros(max(rows, 8), np.int64), normal_rhs=each_row(),
         normal_impulses=each_row(), normal_row=np.zeros(max(rows, 8), np.int64),

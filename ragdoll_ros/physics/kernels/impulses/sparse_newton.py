@@ -24,16 +24,19 @@ from ..workspace import Island, Workspace
 from .one_contact import project_to_disc
 
 SPARSE_STEPS, SPARSE_PATIENCE = 12, 4
-"""Newton steps at most, and those in vain: without these halvings, contacts that change between
-sticking and sliding let the steps cycle."""
+"""Newton steps at most, and those that do not halve the residual. It may grow on the way, as
+contacts change between sticking and sliding; the best is kept."""
 
-HALVED_SHARES = 4
-"""Shares of a step that are tried, each half of the one before."""
+HALVED_SHARES, GROWTH = 4, 100.0
+"""Shares of a step that are tried, each half of the one before, until the sum of squares is below
+the largest of the last three (Grippo, Lampariello and Lucidi 1986), or in the first two steps below
+GROWTH times that of the start. Without, steps cycle in heaps; were each to reduce it, they would
+stall among redundant contacts."""
 
-FIRST_PROXIMAL, LEAST_PROXIMAL, MOST_PROXIMAL = 1e-3, 1e-6, 0.1
-"""Share of the diagonal of W that resists a step: of the first one, a tenth of it after each whole
-step, as what is left is what the impulses of several bodies decide together, and ten times as much
-after a step in vain."""
+MOST_PROXIMAL, LEAST_PROXIMAL = 1e-3, 1e-6
+"""Share of W's diagonal that resists the steps: at first, and a tenth after each that halves the
+residual, as what is left is what the impulses of several bodies decide together. In heaps less at
+first lets the steps cycle; ten times as much takes three times as many."""
 
 
 @compiled
@@ -148,7 +151,7 @@ def write_velocities(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> Non
 
 
 @compiled
-def linearize_contact(island: Island, k: int, p: np.ndarray, proximal: float) -> float:
+def linearize_contact(island: Island, k: int, p: np.ndarray) -> float:
     """Write phi of member k, scaled to velocities, to island.phi[k], and A and B of its
     linearization to island.A[k] and island.B[k]. Returns the largest entry of phi.
     """
@@ -187,19 +190,20 @@ def linearize_contact(island: Island, k: int, p: np.ndarray, proximal: float) ->
                 for g in range(2):
                     A[e + f, e + g] = own_t * ((1.0 if f == g else 0.0) - B[e + f, e + g])
         worst = max(worst, abs(phi[e]), abs(phi[e + 1]))
-    for g in range(member.kind):
-        softness = block[g, g] * (member.compliance / (1 + member.compliance) + proximal)
-        for e in range(member.kind):
-            A[e, g] += B[e, g] * softness
     return worst
 
 
 @compiled
-def eliminate_contact(island: Island, k: int) -> None:
+def eliminate_contact(island: Island, k: int, proximal: float) -> None:
     """Replace B of member k by C^-1 B and phi by C^-1 phi; C, in island.A[k], has its pivots on the
     diagonal: entries right of it are between the two rows of a sliding direction alone.
     """
     A, B, phi, kind = island.A[k], island.B[k], island.phi[k], island.members[k].kind
+    soft = island.members[k].compliance
+    for g in range(kind):
+        softness = island.blocks[k, g, g] * (soft / (1 + soft) + proximal)
+        for e in range(kind):
+            A[e, g] += B[e, g] * softness
     for e in range(kind):
         for i in range(e + 1, kind):
             f = A[i, e] / A[e, e]
@@ -282,64 +286,71 @@ def find_direction(island: Island, m: int) -> None:
 
 
 @compiled
-def linearize(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray,
-              proximal: float) -> tuple[float, float]:
+def linearize(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> tuple[float, float]:
     """Linearize m contacts at p. Returns the largest entry of phi, m/s, and the sum of squares."""
     write_velocities(ws, m, b, p)
     worst = total = 0.0
     for k in range(m):
-        worst = max(worst, linearize_contact(ws.island, k, p, proximal))
+        worst = max(worst, linearize_contact(ws.island, k, p))
         for e in range(ws.island.members[k].kind):
             total += ws.island.phi[k, e] * ws.island.phi[k, e]
     return worst, total
 
 
 @compiled
-def take_step(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, proximal: float,
-              total: float) -> float:
-    """Move p along island.direction, by the first of HALVED_SHARES that reduces phi's sum of
-    squares, ``total``, by half as much as a linear function. Returns the share; 0 if none does.
+def take_step(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
+              most: float) -> tuple[float, float]:
+    """Move p along island.direction by the first of HALVED_SHARES that leaves phi's sum of squares
+    below ``most``, or the last. Returns what linearize() does there.
     """
-    start, direction, share = ws.island.best, ws.island.direction, 1.0
+    start, direction, share = ws.island.step_start, ws.island.direction, 1.0
+    worst = total = 0.0
     for i in range(n):
         start[i] = p[i]
     for _ in range(HALVED_SHARES):
         for i in range(n):
             p[i] = start[i] + share * direction[i]
-        if linearize(ws, m, b, p, proximal)[1] < (1 - share / 2) * total:
-            return share
+        worst, total = linearize(ws, m, b, p)
+        if total < most:
+            break
         share /= 2
-    for i in range(n):
-        p[i] = start[i]
-    return 0.0
+    return worst, total
 
 
 @compiled
 def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
                   dofs: int) -> float:
-    """Take Newton steps from p, in place. Returns the residual, m/s; island.z becomes Y^T p.
-    ``dofs``: from find_sparsity().
+    """Take Newton steps from p, which becomes the best found. Returns its residual, m/s; island.z
+    becomes Y^T p. ``dofs``: from find_sparsity().
     """
-    island, late, proximal, worst = ws.island, 0, FIRST_PROXIMAL, math.inf
+    island, keep = ws.island, ws.island.best
+    best, late, proximal, before = math.inf, 0, MOST_PROXIMAL, math.inf
+    worst, total = linearize(ws, m, b, p)
+    older = old = GROWTH * total
     for turn in range(SPARSE_STEPS + 1):
-        worst, total = linearize(ws, m, b, p, proximal)
-        if worst <= tolerance or late > SPARSE_PATIENCE or turn == SPARSE_STEPS:
+        late = 0 if worst < best / 2 else late + 1
+        proximal = max(LEAST_PROXIMAL, proximal / 10) if worst < before / 2 else MOST_PROXIMAL
+        before = worst
+        if worst < best:
+            best = worst
+            for i in range(n):
+                keep[i] = p[i]
+        if best <= tolerance or late > SPARSE_PATIENCE or turn == SPARSE_STEPS:
             break
         for k in range(m):
-            eliminate_contact(island, k)
+            eliminate_contact(island, k, proximal)
             multiply_rows(island, k)
         if not solve_for_z(island, dofs):
             break
         find_direction(island, m)
-        share = take_step(ws, m, n, b, p, proximal, total)
-        if share == 0.0:
-            proximal, late = min(10 * proximal, MOST_PROXIMAL), late + 1
-        elif share == 1.0:
-            proximal = max(LEAST_PROXIMAL, proximal / 10)
+        most, older, old = max(total, old, older), old, total
+        worst, total = take_step(ws, m, n, b, p, most)
+    for i in range(n):
+        p[i] = keep[i]
     for k in range(m):
         project_member(island, k, p)
     write_velocities(ws, m, b, p)
-    return worst
+    return best
 
 
 @compiled
