@@ -17,6 +17,8 @@ from ragdoll_ros.viewer.sources.simulation import SimulationSource
 
 SCENE = load_scene('drop')
 
+KEEP = '() => { window.ragdollKeepsQuality = true; }'
+
 SHADOWS = """cast => {
   window.__viserMutable.scene.traverse(node => { if (node.shadow && node.parent.isScene)
     node.castShadow = cast; });
@@ -28,7 +30,7 @@ SHADOWS = """cast => {
 def seen():
     """A page at its start, paused, and the view of it with all that a user sees."""
     kept = browser.SHARPNESS, browser.PLAIN
-    browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
+    browser.SHARPNESS, browser.PLAIN = 1, KEEP
     try:
         with served(SimulationSource(SCENE)) as page, chromium() as context:
             page.source.pause(True)
@@ -119,3 +121,28 @@ def test_a_bone_has_the_colour_that_its_file_gives(seen, bone):
     drawn = around(still(view), view.pixels([at])[0], 3) / 255
     given = SCENE.bones[SCENE.bone_index(bone)].color[:3]
     assert drawn == pytest.approx(given, abs=0.15)
+
+
+def test_a_force_is_seen_with_its_newtons_though_a_body_is_before_it(seen):
+    """After a fall, 30 pixels of the arrows' colour, which nothing else has, and a label of N.
+
+    The arrows begin below the bodies and run through them.
+    """
+    page, view = seen
+    view.page.set_viewport_size(browser.SIZE)
+    page.display.contacts.value = True
+    page.source.pause(False)
+    view.wait(lambda: page.frame.forces is not None and len(page.frame.forces) > 1
+              and page.frame.time > 1.5)
+    page.source.pause(True)
+    view.key('h')
+    label = view.wait(lambda: page.server.scene.get_handle_by_name('/scene/newtons/0'))
+    assert label.text.endswith(' N')
+
+    def is_orange():
+        red, green, blue = np.moveaxis(still(view)[:, :500], 2, 0)
+        return ((red > 200) & (green > 80) & (green < 190) & (blue < 60)).sum() > 30
+
+    view.wait(is_orange)
+    page.display.contacts.value = False
+    page.source.reset()

@@ -25,8 +25,8 @@ class DisplayOptions:
                 hint='the camera moves with the pushed doll; it returns when this is switched off; '
                 'it comes on by itself when the doll would leave the picture')
             self.contacts = server.gui.add_checkbox(
-                'Contacts', initial_value=False, hint='contact points, yellow, and normal forces: '
-                'a line of 1 m is the weight of the first doll')
+                'Contacts', initial_value=False, hint='contact points and normal forces as arrows: '
+                '1 m is the weight of the first doll; a node publishes points without forces')
             self.limits = server.gui.add_checkbox(
                 'Joint limits', initial_value=False,
                 hint="an arc for a joint's range; its needle is red at the limits")
