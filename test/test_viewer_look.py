@@ -19,6 +19,24 @@ SCENE = load_scene('drop')
 
 KEEP = '() => { window.ragdollKeepsQuality = true; }'
 
+CASTS = 'window.__viserMutable.scene.children.filter(each => each.castShadow && each.shadow).length'
+"""How many lights cast shadows: viser makes three of the main one."""
+
+DPR = 'window.__viserMutable.scene.__r3f.root.getState().viewport.dpr'
+
+SLOW_DOWN = """() => {
+  window.ragdollTestSlow = true;
+  window.ragdollKeepsQuality = false;
+  const wait = () => {
+    if (!window.ragdollTestSlow) return;
+    const end = performance.now() + 120;
+    while (performance.now() < end);
+    window.__viserMutable.requestRender();
+    requestAnimationFrame(wait);
+  };
+  wait();
+}"""
+
 SHADOWS = """cast => {
   window.__viserMutable.scene.traverse(node => { if (node.shadow && node.parent.isScene)
     node.castShadow = cast; });
@@ -146,3 +164,31 @@ def test_a_force_is_seen_with_its_newtons_though_a_body_is_before_it(seen):
     view.wait(is_orange)
     page.display.contacts.value = False
     page.source.reset()
+
+
+@pytest.mark.parametrize(('chances', 'pictures', 'slow'), [
+    (15, 15, True), (28, 20, True), (60, 60, False), (60, 1, False), (15, 2, False)])
+def test_only_a_page_that_draws_all_it_can_is_slow(seen, chances, pictures, slow):
+    """Not one at rest, which draws once a second, nor one whose script is busy."""
+    _, view = seen
+    assert view.page.evaluate('counts => window.ragdollIsSlow(...counts)',
+                              [chances, pictures, 1.5]) == slow
+
+
+def test_a_slow_page_drops_its_shadows_then_resolution_and_says_so(seen):
+    """Slowed by 120 ms before each picture; another size of the window begins anew."""
+    _, view = seen
+    note = view.page.locator('.ragdoll-quality')
+    view.page.set_viewport_size(browser.SIZE)
+    view.page.evaluate(SLOW_DOWN)
+    try:
+        view.page.wait_for_function(f'{CASTS} === 0')
+        view.wait(lambda: 'without shadows' in note.inner_text())
+        view.page.wait_for_function(f'{DPR} < 0.5 * devicePixelRatio')
+        view.wait(lambda: '40 % of the resolution' in note.inner_text())
+    finally:
+        view.page.evaluate('() => { window.ragdollTestSlow = false; }')
+    view.page.set_viewport_size({'width': 700, 'height': 520})
+    view.page.wait_for_function(f'{CASTS} === 3 && {DPR} >= 0.7 * devicePixelRatio')
+    view.wait(lambda: not note.is_visible())
+    view.page.evaluate(KEEP)
