@@ -142,7 +142,7 @@ def main(folder: Path) -> None:
     """Take all pictures."""
     browser.SIZE.update(SIZE)
     # The tests draw half the pixels, without shadows.
-    browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
+    browser.SHARPNESS, browser.PLAIN = 1, '() => { window.ragdollKeepsQuality = true; }'
     browser.PATIENCE = 100.0
     with browser.chromium() as context:
         for picture in (fall, grab, edit, skin, field):

@@ -36,6 +36,7 @@ REQUIRED = os.environ.get('RAGDOLL_BROWSER') == 'required'
 READY = "window.__viserMutable?.scene && window.__viserMutable.nodeRefFromName['']"
 
 PLAIN = """() => {
+  window.ragdollKeepsQuality = true;
   document.head.insertAdjacentHTML('beforeend',
     '<style>.mantine-Notification-root {display: none}</style>');
   const {scene} = window.__viserMutable;
@@ -46,9 +47,9 @@ PLAIN = """() => {
   };
   unshade();
 }"""
-"""No notes, as of software rendering, which no user with a GPU gets, lie over the picture. Neither
-reflections nor shadows: without a GPU, those cost each page that is opened 8 s of a
-processor before its first pictures, and two thirds of every further one."""
+"""No notes, as of software rendering, which no user with a GPU gets, lie over the picture, whose
+quality stays. Neither reflections nor shadows: without a GPU, those cost each page that is opened
+8 s of a processor before its first pictures, and two thirds of every further one."""
 
 BODIES = """() => {
   const {scene, nodeRefFromName: nodes} = window.__viserMutable;

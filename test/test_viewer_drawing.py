@@ -24,6 +24,7 @@ from ragdoll_ros.model.scene import Placement, Scene, above_ground
 from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.engine.protocol import GROUND
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Rods
 from ragdoll_ros.viewer.drawing import framing
@@ -31,10 +32,11 @@ from ragdoll_ros.viewer.drawing.bodies import Bodies
 from ragdoll_ros.viewer.drawing.joint_balls import joint_balls
 from ragdoll_ros.viewer.drawing.joint_limits import ARC_SEGMENTS, RIM, SPOKES, JointLimits
 from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, SEGMENTS
-from ragdoll_ros.viewer.drawing.overlays import arrow_to_surface
+from ragdoll_ros.viewer.drawing.overlays import arrow_to_surface, force_arrows
 from ragdoll_ros.viewer.drawing.skin_meshes import SkinMeshes
 from ragdoll_ros.viewer.drawing.stage import CELL, FADE, grid_size
 from ragdoll_ros.viewer.pointer import nearest_bone, target_at_distance, to_bone_frame
+from ragdoll_ros.viewer.sources.source import Frame
 
 CORNERS = SEGMENTS / 2 * np.sin(2 * np.pi / SEGMENTS)
 """Area of the polygon of SEGMENTS corners in a circle of radius 1, which stands for pi."""
@@ -178,6 +180,39 @@ def test_needles_are_red_at_their_limit():
     assert [tuple(color) for color in colors] == [
         RED if k == 3 else GREEN for k in range(len(angles))]
     server.stop()
+
+
+def test_the_arrows_of_a_doll_at_rest_bear_its_weight():
+    """Those at the ground: their sum is straight up, mass times gravity within 1 %; each begins
+    there and is as long as its N are; and the doll lies on more than one of its ten bones.
+    """
+    scene = load_scene('drop')
+    with Simulation(scene) as simulation:
+        while not simulation.asleep:
+            state = simulation.advance()
+        contacts = simulation.contacts
+    low = contacts.b == GROUND
+    frame = Frame(scene, 0.0, state, contacts=contacts.positions[low],
+                  forces=(contacts.normals * contacts.forces[:, None])[low],
+                  pairs=np.stack([contacts.a, contacts.b], axis=1)[low])
+    arrows, newtons = force_arrows(frame)
+    doll = scene.dolls[0].doll
+    weight = doll.mass * -scene.gravity[2]
+    assert 2 <= len(arrows) <= 10
+    along = np.diff(arrows, axis=1)[:, 0]
+    pulled = (along / np.linalg.norm(along, axis=1)[:, None] * newtons[:, None]).sum(axis=0)
+    assert pulled == pytest.approx((0, 0, weight), abs=0.01 * weight)
+    assert np.linalg.norm(along, axis=1) == pytest.approx(newtons / (9.8 * doll.mass))
+    assert abs(arrows[:, 0, 2]).max() < 0.001
+    assert (np.diff(newtons) <= 0).all()
+
+
+def test_no_arrow_where_a_source_knows_no_forces():
+    scene = load_scene('drop')
+    with Simulation(scene) as simulation:
+        frame = Frame(scene, 0.0, simulation.state, contacts=np.zeros((3, 3)))
+    arrows, newtons = force_arrows(frame)
+    assert len(arrows) == len(newtons) == 0
 
 
 @pytest.fixture(scope='module')

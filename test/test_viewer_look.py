@@ -17,6 +17,26 @@ from ragdoll_ros.viewer.sources.simulation import SimulationSource
 
 SCENE = load_scene('drop')
 
+KEEP = '() => { window.ragdollKeepsQuality = true; }'
+
+CASTS = 'window.__viserMutable.scene.children.filter(each => each.castShadow && each.shadow).length'
+"""How many lights cast shadows: viser makes three of the main one."""
+
+DPR = 'window.__viserMutable.scene.__r3f.root.getState().viewport.dpr'
+
+SLOW_DOWN = """() => {
+  window.ragdollTestSlow = true;
+  window.ragdollKeepsQuality = false;
+  const wait = () => {
+    if (!window.ragdollTestSlow) return;
+    const end = performance.now() + 120;
+    while (performance.now() < end);
+    window.__viserMutable.requestRender();
+    requestAnimationFrame(wait);
+  };
+  wait();
+}"""
+
 SHADOWS = """cast => {
   window.__viserMutable.scene.traverse(node => { if (node.shadow && node.parent.isScene)
     node.castShadow = cast; });
@@ -28,7 +48,7 @@ SHADOWS = """cast => {
 def seen():
     """A page at its start, paused, and the view of it with all that a user sees."""
     kept = browser.SHARPNESS, browser.PLAIN
-    browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
+    browser.SHARPNESS, browser.PLAIN = 1, KEEP
     try:
         with served(SimulationSource(SCENE)) as page, chromium() as context:
             page.source.pause(True)
@@ -119,3 +139,56 @@ def test_a_bone_has_the_colour_that_its_file_gives(seen, bone):
     drawn = around(still(view), view.pixels([at])[0], 3) / 255
     given = SCENE.bones[SCENE.bone_index(bone)].color[:3]
     assert drawn == pytest.approx(given, abs=0.15)
+
+
+def test_a_force_is_seen_with_its_newtons_though_a_body_is_before_it(seen):
+    """After a fall, 30 pixels of the arrows' colour, which nothing else has, and a label of N.
+
+    The arrows begin below the bodies and run through them.
+    """
+    page, view = seen
+    view.page.set_viewport_size(browser.SIZE)
+    page.display.contacts.value = True
+    page.source.pause(False)
+    view.wait(lambda: page.frame.forces is not None and len(page.frame.forces) > 1
+              and page.frame.time > 1.5)
+    page.source.pause(True)
+    view.key('h')
+    label = view.wait(lambda: page.server.scene.get_handle_by_name('/scene/newtons/0'))
+    assert label.text.endswith(' N')
+
+    def is_orange():
+        red, green, blue = np.moveaxis(still(view)[:, :500], 2, 0)
+        return ((red > 200) & (green > 80) & (green < 190) & (blue < 60)).sum() > 30
+
+    view.wait(is_orange)
+    page.display.contacts.value = False
+    page.source.reset()
+
+
+@pytest.mark.parametrize(('chances', 'pictures', 'slow'), [
+    (15, 15, True), (28, 20, True), (60, 60, False), (60, 1, False), (15, 2, False)])
+def test_only_a_page_that_draws_all_it_can_is_slow(seen, chances, pictures, slow):
+    """Not one at rest, which draws once a second, nor one whose script is busy."""
+    _, view = seen
+    assert view.page.evaluate('counts => window.ragdollIsSlow(...counts)',
+                              [chances, pictures, 1.5]) == slow
+
+
+def test_a_slow_page_drops_its_shadows_then_resolution_and_says_so(seen):
+    """Slowed by 120 ms before each picture; another size of the window begins anew."""
+    _, view = seen
+    note = view.page.locator('.ragdoll-quality')
+    view.page.set_viewport_size(browser.SIZE)
+    view.page.evaluate(SLOW_DOWN)
+    try:
+        view.page.wait_for_function(f'{CASTS} === 0')
+        view.wait(lambda: 'without shadows' in note.inner_text())
+        view.page.wait_for_function(f'{DPR} < 0.5 * devicePixelRatio')
+        view.wait(lambda: '40 % of the resolution' in note.inner_text())
+    finally:
+        view.page.evaluate('() => { window.ragdollTestSlow = false; }')
+    view.page.set_viewport_size({'width': 700, 'height': 520})
+    view.page.wait_for_function(f'{CASTS} === 3 && {DPR} >= 0.7 * devicePixelRatio')
+    view.wait(lambda: not note.is_visible())
+    view.page.evaluate(KEEP)

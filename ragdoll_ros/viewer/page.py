@@ -71,7 +71,8 @@ class Page:
                      else hint(RECORDING_HINT, 'ragdollRecordingHint'),
                      style('disconnected_banner.css', message=DISCONNECTED),
                      script('null_node_guard.js'), script('materials.js'), script('look.js'),
-                     script('hide_drag_arrow.js'), script('handle_picking.js', ROOT=ROOT),
+                     script('quality.js'), script('hide_drag_arrow.js'),
+                     script('handle_picking.js', ROOT=ROOT),
                      script('upload_notices.js'), script('decimal_comma.js')):
             server.gui.add_html(html)
         self._edit_banner = Banner(server.gui)

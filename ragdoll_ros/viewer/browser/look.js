@@ -1,3 +1,4 @@
+// Draws contacts and joint limits over the bodies that would hide them.
 // Draws colours as they are given, by Khronos' neutral tone mapping (7 in three.js) in place of one
 // that imitates film, and shadows with soft edges that start 2 cm from what casts them, or bodies
 // would have stripes of their own. Viser has no options for these, and makes its lights anew.
@@ -11,4 +12,11 @@ if (!window.ragdollLook) (function apply() {
     shadow.radius = 4;
     shadow.normalBias = 0.02;
   }
+  for (const name of ['contacts', 'forces', 'limits'])
+    viewer.nodeRefFromName[`/scene/${name}`]?.traverse((node) => {
+      if (!node.material || !node.material.depthTest) return;
+      node.material.depthTest = false;
+      node.renderOrder = 10;
+      node.castShadow = false;
+    });
 })();

@@ -22,23 +22,23 @@ class DisplayOptions:
         with server.gui.add_folder('Show'):
             self.follow = server.gui.add_checkbox(
                 'Follow', initial_value=False,
-                hint='the camera moves with the pushed doll; it returns when this is switched off; '
+                hint='The camera moves with the pushed doll; it returns when this is switched off; '
                 'it comes on by itself when the doll would leave the picture')
             self.contacts = server.gui.add_checkbox(
-                'Contacts', initial_value=False, hint='contact points, yellow, and normal forces: '
-                'a line of 1 m is the weight of the first doll')
+                'Contacts', initial_value=False, hint='Contact points and normal forces as arrows: '
+                '1 m is the weight of the first doll; a node publishes points without forces')
             self.limits = server.gui.add_checkbox(
                 'Joint limits', initial_value=False,
-                hint="an arc for a joint's range; its needle is red at the limits")
+                hint="An arc for a joint's range; its needle is red at the limits")
             self.dark = server.gui.add_checkbox(
-                'Dark', initial_value=False, hint='a dark page and ground, on all pages')
+                'Dark', initial_value=False, hint='A dark page and ground, on all pages')
             self.dark.on_update(lambda _: configure_theme(server, self.dark.value))
             self.skin = server.gui.add_checkbox(
                 'Skin', initial_value=True, visible=False,
-                hint="the fitted character's skin, which follows the bones")
+                hint="The fitted character's skin, which follows the bones")
             self.bones = server.gui.add_checkbox(
                 'Bones', initial_value=False, visible=False,
-                hint='the bodies that move the skin, translucent')
+                hint='The bodies that move the skin, translucent')
 
     def on_home(self, callback: Callable[[viser.ClientHandle], None]) -> None:
         """Call this with each page that asks for the home view."""

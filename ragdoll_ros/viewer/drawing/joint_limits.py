@@ -24,7 +24,7 @@ RIM, SPOKES = 32, 8
 MAX_ANGLES = 3
 """Of a joint."""
 
-GRAY, GREEN, RED, BLUE = (120, 125, 130), (30, 150, 70), (225, 40, 30), (120, 160, 210)
+GRAY, GREEN, RED, BLUE = (90, 95, 102), (30, 150, 70), (225, 40, 30), (120, 160, 210)
 MARGIN = np.radians(1.0)
 """rad from a limit within which, or beyond which, the needle is red."""
 
@@ -57,7 +57,7 @@ class JointLimits:
         points, colors = self._arcs.lines(state, angles), self._arcs.colors(angles)
         if self._handle is None:
             self._handle = self._server.scene.add_line_segments(
-                '/scene/limits', points, colors, thickness=2.5, thickness_units='screen')
+                '/scene/limits', points, colors, thickness=3.5, thickness_units='screen')
             return
         self._handle.points, self._handle.colors = points, colors
         self._handle.visible = True

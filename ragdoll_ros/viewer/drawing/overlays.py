@@ -15,7 +15,13 @@ from ..sources.source import Frame
 WEIGHT_LENGTH, MAX_LENGTH = 1.0, 2.0
 """m: line of a force equal to the first doll's weight at 9.8 m/s^2; longest line of a force."""
 
-BROWN, RED, BLUE, YELLOW = (90, 50, 25), (230, 50, 25), (30, 110, 230), (245, 190, 0)
+LEAST_FORCE = 0.01
+"""Of the first doll's weight: smaller forces have no arrow."""
+
+MOST_ARROWS, MOST_LABELS = 100, 12
+"""Of forces, the strongest first."""
+
+BROWN, RED, BLUE, ORANGE = (90, 50, 25), (230, 50, 25), (30, 110, 230), (235, 110, 0)
 ROD_THICKNESS = 0.012
 """m: of a swing's rods."""
 
@@ -38,9 +44,12 @@ class Overlays:
             'pointers': lambda name, points: add.add_point_cloud(
                 name, points, BLUE, point_size=0.05, point_shape='circle'),
             'contacts': lambda name, points: add.add_point_cloud(
-                name, points, YELLOW, point_size=0.04, point_shape='circle'),
-            'forces': lambda name, points: add.add_line_segments(
-                name, points, YELLOW, thickness=4.0, thickness_units='screen')}
+                name, points, ORANGE, point_size=0.02, point_shape='circle'),
+            'forces': lambda name, points: add.add_arrows(
+                name, points, ORANGE, shaft_radius=0.01, head_radius=0.03, head_length=0.07)}
+        self._scene = server.scene
+        self._labels: list[viser.LabelHandle] = []
+        """Of forces, N."""
         self._handles: dict[str, viser.SceneNodeHandle] = {}
         self._pushes: tuple[Push, ...] = ()
         self._last_push = 0.0
@@ -60,7 +69,22 @@ class Overlays:
         self._set('hands', [(grab.point, grab.target) for grab in frame.grabs])
         self._set('pointers', [grab.target for grab in frame.grabs])
         self._set('contacts', frame.contacts)
-        self._set('forces', force_lines(frame))
+        arrows, newtons = force_arrows(frame)
+        self._set('forces', arrows)
+        self._label(arrows[:MOST_LABELS], newtons)
+
+    def _label(self, arrows: np.ndarray, newtons: np.ndarray) -> None:
+        """Write the forces at the tips of their arrows (k, 2, 3) m."""
+        while len(self._labels) > len(arrows):
+            self._labels.pop().remove()
+        for index, (arrow, force) in enumerate(zip(arrows, newtons, strict=False)):
+            text = f'{force:.0f} N'
+            if index == len(self._labels):
+                self._labels.append(self._scene.add_label(
+                    f'/scene/newtons/{index}', text, position=arrow[1], anchor='bottom-center'))
+            else:
+                label = self._labels[index]
+                label.text, label.position = text, arrow[1]
 
     def _set(self, kind: str, points: object) -> None:
         handle = self._handles.get(kind)
@@ -76,14 +100,28 @@ class Overlays:
         handle.visible = True
 
 
-def force_lines(frame: Frame) -> np.ndarray | None:
-    """Ends (c, 2, 3) m of a line for the force at each contact; None if forces are unknown."""
-    if frame.forces is None:
-        return None
-    lines = frame.forces * WEIGHT_LENGTH / (9.8 * frame.scene.dolls[0].doll.mass)
-    lengths = np.linalg.norm(lines, axis=1, keepdims=True)
-    lines = lines * np.minimum(1.0, MAX_LENGTH / np.maximum(lengths, 1e-9))
-    return np.stack([frame.contacts, frame.contacts + lines], axis=1)
+def force_arrows(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+    """Tails and tips (k, 2, 3) m of the contact forces, and these (k,) N, the largest first.
+
+    One for all contact points of a bone with another or with the ground, at their centre of
+    pressure. None where forces are unknown, or below LEAST_FORCE.
+    """
+    if frame.forces is None or not len(frame.forces):
+        return np.zeros((0, 2, 3)), np.zeros(0)
+    weight = 9.8 * frame.scene.dolls[0].doll.mass
+    _, group = np.unique(frame.pairs, axis=0, return_inverse=True)
+    sizes = np.linalg.norm(frame.forces, axis=1)
+    group = group.ravel()
+    forces, moments = np.zeros((2, group.max() + 1, 3))
+    np.add.at(forces, group, frame.forces)
+    np.add.at(moments, group, sizes[:, None] * frame.contacts)
+    total = np.bincount(group, sizes)
+    newtons = np.linalg.norm(forces, axis=1)
+    order = np.argsort(-newtons)[:MOST_ARROWS]
+    order = order[newtons[order] >= LEAST_FORCE * weight]
+    tails = moments[order] / total[order, None]
+    lengths = np.minimum(WEIGHT_LENGTH / weight, MAX_LENGTH / newtons[order])
+    return np.stack([tails, tails + forces[order] * lengths[:, None]], axis=1), newtons[order]
 
 
 def arrow_to_surface(bone: Bone, push: Push, position: np.ndarray,
