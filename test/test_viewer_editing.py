@@ -195,3 +195,43 @@ def test_keys_mean_no_two_things(view):
     view.wait(lambda: abs(view.bodies(SCENE) - START).max() > 0.01)
     view.tab('Play')
     view.hold_at(SCENE, START)
+
+
+def row(view, name):
+    """The line of the tree with a bone."""
+    return view.page.locator(f'.ragdoll-tree [data-bone="{name}"]')
+
+
+def selected(view):
+    return set(view.page.locator('.ragdoll-tree [aria-selected=true]').all_text_contents())
+
+
+def test_bones_are_chosen_in_the_tree_and_in_the_picture(view):
+    """With Ctrl several, whose masses are changed and undone as one step; a child is indented."""
+    view.tab('Edit')
+    row(view, 'torso').click()
+    view.wait(lambda: selected(view) == {'torso'} and view.field('bone').input_value() == 'torso')
+    left = [row(view, name).evaluate('row => parseFloat(getComputedStyle(row).paddingLeft)')
+            for name in ('torso', 'left_thigh', 'left_shin')]
+    assert left == sorted(set(left))
+    row(view, 'left_shin').click(modifiers=['Shift'])
+    view.page.keyboard.down('Control')
+    index = SCENE.bone_index('head')
+    view.page.mouse.click(*view.pixels(START[index:index + 1])[0])
+    view.page.keyboard.up('Control')
+    names = {'torso', 'left_shin', 'head'}
+    view.wait(lambda: selected(view) == names)
+    view.see('3 bones are selected')
+    field = view.field('mass, kg')
+    assert field.input_value() == '(several)'
+    field.fill('6.5')
+    field.press('Enter')
+    view.see('Undo: numbers of 3 bones')
+    scene = saved(view)
+    assert [bone.mass == 6.5 for bone in scene.bones] == [
+        bone.name in names for bone in scene.bones]
+    view.press('Undo: numbers of 3 bones')
+    view.button('Undo').wait_for()
+    assert saved(view) == SCENE
+    row(view, 'head').click()
+    view.wait(lambda: selected(view) == {'head'})

@@ -153,11 +153,11 @@ class Page:
             doll_mean(frame.scene, pushes.bone, frame.state.positions),
             pushes.motion.doll_velocity(pushes.bone))
 
-    def _select(self, bone: str) -> None:
-        """Push a bone that was clicked from now on, and edit it."""
+    def _select(self, bone: str, add: bool) -> None:
+        """Push a bone that was clicked from now on, and edit it; ``add``: besides others."""
         self.controls.pushes.choose(bone)
         if self.editor is not None:
-            self.editor.select(bone)
+            self.editor.select(bone, add)
 
     def _grabbable_frame(self) -> Frame | None:
         """The shown frame; None if it is in the past, where nothing can be grabbed."""

@@ -57,20 +57,20 @@ class BodyHandles:
         """Node of the current handles. The name is new each time: viser keeps the old pose of a
         node that is added again at the origin."""
         self._count = 0
-        self._shown: tuple | None = None
+        self._shown: object = None
         """What the handles depend on."""
         self._reset: Callable[[], None] = lambda: None
 
     def hide(self) -> None:
         """Remove all handles."""
-        if self.body is not None:
+        if self._shown is not None:
             self._server.scene.remove_by_name(self.root)
         self.body = self.size = self._shown = None
 
     def reset(self) -> None:
         """Put the handles back after a drag that has changed nothing."""
         if self._shown is not None:
-            self._shown = None
+            self.hide()
             self._reset()
 
     def show(self, scene: Scene, name: str, limb: bool) -> None:
@@ -80,18 +80,11 @@ class BodyHandles:
         shown = name, self.mode, limb, *origin, placement.orientation, bone, joint
         if shown == self._shown:
             return
-        self.hide()
-        self._shown, self._reset = shown, lambda: self.show(scene, name, limb)
-        self._count += 1
-        self.root = f'{ROOT}/{self._count}'
+        self._begin(shown, lambda: self.show(scene, name, limb))
         at = joint.anchor if limb and joint else bone.position
         with self._server.atomic():
-            self._server.scene.add_frame(
-                self.root, position=origin, wxyz=_wxyz(placement.orientation), show_axes=False)
-            self._frame = self._server.scene.add_frame(
-                f'{self.root}/frame', position=bone.position, wxyz=_wxyz(bone.orientation),
-                show_axes=False)
-            self._add_outline(bone)
+            self._add_frame(self.root, origin, placement.orientation)
+            self._frame = self._add_outline(f'{self.root}/frame', bone)
             if joint is not None:
                 self._add_pivot(joint, bone)
             if self.mode != 'size':
@@ -99,13 +92,41 @@ class BodyHandles:
             elif bone.shape.kind in SHAPES:
                 self._add_size(bone)
 
-    def _add_outline(self, bone: Bone) -> None:
+    def show_outlines(self, scene: Scene, names: Sequence[str]) -> None:
+        """Show the outlines of several bones, without handles."""
+        found = [find(scene, name) for name in names]
+        if found == self._shown:
+            return
+        self._begin(found, lambda: self.show_outlines(scene, names))
+        with self._server.atomic():
+            self._add_frame(self.root, (0.0, 0.0, 0.0), rotation.IDENTITY)
+            for number, (placement, bone) in enumerate(found):
+                node = f'{self.root}/{number}'
+                self._add_frame(node, placement.position + _lift(scene, placement),
+                                placement.orientation)
+                self._add_outline(f'{node}/frame', bone)
+
+    def _begin(self, shown: object, reset: Callable[[], None]) -> None:
+        """Begin a new root, for handles that depend on ``shown``."""
+        self.hide()
+        self._shown, self._reset = shown, reset
+        self._count += 1
+        self.root = f'{ROOT}/{self._count}'
+
+    def _add_frame(self, node: str, position: Sequence[float],
+                   orientation: Sequence[float]) -> viser.FrameHandle:
+        return self._server.scene.add_frame(node, position=position, wxyz=_wxyz(orientation),
+                                            show_axes=False)
+
+    def _add_outline(self, node: str, bone: Bone) -> viser.FrameHandle:
+        frame = self._add_frame(node, bone.position, bone.orientation)
         for number, part in enumerate(bone.shape.primitives):
             vertices, faces = MESHES[part.kind]
             self._server.scene.add_mesh_simple(
-                f'{self.root}/frame/outline_{number}', vertices * part.size * OUTLINE_SCALE, faces,
+                f'{node}/outline_{number}', vertices * part.size * OUTLINE_SCALE, faces,
                 color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False,
                 position=part.position, wxyz=_wxyz(part.orientation))
+        return frame
 
     def _add_pivot(self, joint: Joint, bone: Bone) -> None:
         """Draw the joint: a sphere at its anchor, a line along each axis, the first in blue."""
