@@ -23,6 +23,7 @@ from ragdoll_ros.files.scene import load_scene, save_scene  # noqa: E402
 from ragdoll_ros.fit.judging.finding import Finding  # noqa: E402
 from ragdoll_ros.fit.judging.verdict import Verdict  # noqa: E402
 from ragdoll_ros.model import errors, rotation  # noqa: E402
+from ragdoll_ros.model.ragdoll import joint_frame  # noqa: E402
 from ragdoll_ros.model.scene import above_ground  # noqa: E402
 from ragdoll_ros.physics.simulation import Simulation  # noqa: E402
 from ragdoll_ros.recordings.recording import Recording  # noqa: E402
@@ -479,6 +480,55 @@ def test_a_click_on_a_handle_changes_and_replaces_nothing(desk):
     drag(desk.editor.handles.body, np.add(start.position, (0, 0, 0.004)))
     assert desk.asked == asked and desk.editor.handles.root != root
     assert tuple(desk.editor.handles.body.position) == start.position
+
+
+@pytest.mark.parametrize(('name', 'edge', 'angle', 'limits'), [
+    ('left_shin', (0, 1), 90, [(0, 90)]), ('left_shin', (0, 0), -20, [(-20, 126)]),
+    ('head', (1, 0), -35, [(-60, 60), (-35, 60)])])
+def test_a_range_is_dragged_by_its_edges(desk, name, edge, angle, limits):
+    """To where the child would point: seen along the axis, its centre turned by that angle."""
+    desk.editor.select(name)
+    desk.editor.toggle()
+    joint, bone = changes.joint_of(DROP, name), desk.bone(name)
+    axis = np.array(joint.axes[edge[0]])
+    arm = rotation.rotate(rotation.from_axis_angle(axis, np.radians(angle)),
+                          np.subtract(bone.position, joint.anchor))
+    pointer = joint.anchor + arm
+    desk.editor.ranges.drag(edge, pointer + 2 * axis, pointer, False)
+    assert desk.editor.scene == DROP
+    desk.editor.ranges.drag(edge, pointer + 2 * axis, pointer, True)
+    wait(lambda: desk.editor.scene != DROP)
+    assert np.degrees(changes.joint_of(desk.editor.scene, name).limits) == pytest.approx(
+        np.array(limits))
+    desk.editor.undo()
+    assert desk.editor.scene == DROP
+
+
+def test_a_range_goes_in_steps_and_a_cone_stays_symmetric(desk):
+    """What a joint cannot have, a lower limit above the upper one, is not taken."""
+    desk.editor.select('left_shin')
+    desk.panel.joint['kind'].value = 'ball'
+    desk.editor.update()
+    desk.editor.toggle()
+    desk.panel.snap.value = True
+    joint, edge = changes.joint_of(desk.editor.scene, 'left_shin'), (0, 1)
+    assert set(desk.editor.ranges.spheres) == {(k, side) for k in range(3) for side in (0, 1)}
+    axis = rotation.matrix(joint_frame(joint))[:, 0]
+    arm = rotation.rotate(rotation.from_axis_angle(axis, np.radians(33)), np.subtract(
+        desk.bone('left_shin').position, joint.anchor))
+    before = desk.editor.scene
+    desk.editor.ranges.drag(edge, joint.anchor + arm + axis, joint.anchor + arm, True)
+    wait(lambda: desk.editor.scene != before)
+    swing, twist = np.degrees(changes.joint_of(desk.editor.scene, 'left_shin').limits)
+    assert swing == pytest.approx((-35, 35)) and twist == pytest.approx((-30, 30))
+    desk.editor.select('right_shin')
+    joint = changes.joint_of(desk.editor.scene, 'right_shin')
+    arm = np.subtract(desk.bone('right_shin').position, joint.anchor)
+    arm = rotation.rotate(rotation.from_axis_angle(joint.axes[0], np.radians(-40)), arm)
+    asked = list(desk.asked)
+    desk.editor.ranges.drag((0, 1), joint.anchor + arm + joint.axes[0], joint.anchor + arm, True)
+    desk.editor.redo()
+    assert desk.asked == asked
 
 
 def test_a_body_of_several_shapes_is_shown_moved_and_saved(server, desk):

@@ -235,3 +235,49 @@ def test_bones_are_chosen_in_the_tree_and_in_the_picture(view):
     assert saved(view) == SCENE
     row(view, 'head').click()
     view.wait(lambda: selected(view) == {'head'})
+
+
+SPHERES = """() => {
+  const nodes = window.__viserMutable.nodeRefFromName;
+  const names = Object.keys(nodes).filter(name => /^.editor.*.limit_0_1$/.test(name)
+                                                  && nodes[name]);
+  if (names.length !== 1) return null;
+  nodes[names[0]].updateWorldMatrix(true, false);
+  const toWorld = nodes[''].matrixWorld.clone().invert();
+  return toWorld.multiply(nodes[names[0]].matrixWorld).elements.slice(12, 15);
+}"""
+"""Where the one sphere of an upper limit is drawn, m, z up."""
+
+
+def test_a_joint_range_is_dragged_by_its_edge(view):
+    """The knee's upper limit, seen from the side: to 90 degrees, where the shin is level behind."""
+    view.tab('Play')
+    view.page.mouse.click(20, 700)
+    view.key('e')
+    banner(view).wait_for()
+    row(view, BONE).click()
+    view.look((0, 3, 0.8), (0, 0.075, 0.6))
+    anchor, limit = np.array((0, 0.075, 0.625)), np.radians(126)
+    spoke = -np.array((np.sin(limit), 0, np.cos(limit)))
+    view.wait(lambda: view.page.evaluate(SPHERES))
+    view.wait(lambda: np.cross(np.subtract(view.page.evaluate(SPHERES), anchor), spoke)
+              == pytest.approx(0, abs=1e-6))
+    at = view.page.evaluate(SPHERES)
+    radius = np.subtract(at, anchor) @ spoke
+    assert radius > 0.2
+    view.wait(lambda: 0 < view.pixels([at])[0][0] < 900)
+    (x0, y0), (x1, y1) = view.pixels([at, anchor - radius * np.array((1, 0, 0))])
+    view.page.mouse.move(x0, y0)
+    view.page.mouse.down()
+    view.page.mouse.move(x1, y1, steps=10)
+    view.page.mouse.up()
+    view.see(f'Undo: range of {BONE}')
+    scene = saved(view)
+    low, high = np.degrees(changes.joint_of(scene, BONE).limits[0])
+    assert low == 0 and high == pytest.approx(90, abs=1.5)
+    assert changes.change_joint(scene, BONE, limits=changes.joint_of(
+        SCENE, BONE).limits) == SCENE
+    view.press(f'Undo: range of {BONE}')
+    view.button('Undo').wait_for()
+    view.key('h')
+    run(view)

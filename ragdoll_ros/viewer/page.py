@@ -104,6 +104,7 @@ class Page:
         self.controls.pushes.update(time.monotonic())
         frame = self.source.frame if is_open else None
         if is_open:
+            was_editing = self.editor is not None and self.editor.editing
             frames, status = self.source.take_frames(), self.source.status
             start, now = self.start_when_visible, time.monotonic()
             for new in frames:
@@ -116,7 +117,7 @@ class Page:
                                        skins=self.display.skin.value)
                 self.stage.set_dark(self.display.dark.value)
             if self.editor is not None:
-                self.editor.update_paused(status.paused)
+                self.editor.update_paused(status.paused, was_editing)
             self._show_messages(status.problem, status.note)
             self.controls.show(status)
         if self.start_when_visible is not None:

@@ -11,6 +11,7 @@ import numpy as np
 import viser
 
 from ...model import errors
+from ...model.ragdoll import Limits
 from ...model.scene import Scene
 from ..browser.scripts import add_listener
 from ..viser_internals import handle_id
@@ -21,6 +22,7 @@ from .banner import MODES, Banner
 from .edited_scene import EditedScene, Reason
 from .files_panel import FilesPanel
 from .handles.body_handles import BodyHandles, Mode
+from .handles.joint_handles import JointHandles
 from .panel import EditorPanel
 from .scene_folder import SceneFolder
 
@@ -51,7 +53,9 @@ class Editor:
         """Names of the selected bones, the last one that was selected at the end."""
         self.editing = False
         """Whether the source is paused in the bind pose."""
-        self.handles = BodyHandles(server, self._on_pose, self._on_size)
+        self.ranges = JointHandles(server, lambda limits: self._in_order.submit(
+            self._on_limits, limits))
+        self.handles = BodyHandles(server, self.ranges, self._on_pose, self._on_size)
         self.panel = EditorPanel(server.gui, self.select, self.suggest)
         self._connect(server.gui)
         with server.gui.add_folder('Files'):
@@ -102,9 +106,12 @@ class Editor:
             self.handles.mode = mode
             self._show_mode()
 
-    def update_paused(self, paused: bool) -> None:
-        """Take note whether the source is paused: if it was resumed elsewhere, editing ends."""
-        if self._was_paused and not paused and self.editing:
+    def update_paused(self, paused: bool, was_editing: bool = True) -> None:
+        """Take note whether the source is paused: if it was resumed elsewhere, editing ends.
+
+        ``was_editing``: before that was asked; else it tells how it was before editing.
+        """
+        if self._was_paused and not paused and was_editing and self.editing:
             self._set_editing(False)
         self._was_paused = paused
 
@@ -170,7 +177,7 @@ class Editor:
         panel = self.panel
         self._banner.on_action = self._on_action
         panel.limb.on_update(lambda _: self.show_handles())
-        panel.snap.on_update(lambda _: setattr(self.handles, 'snap', panel.snap.value))
+        panel.snap.on_update(lambda _: self._set_snap(panel.snap.value))
         panel.update.on_click(lambda _: self.update())
         panel.add.on_click(lambda _: self.add_bone(panel.name.value))
         panel.remove.on_click(lambda _: self.remove_limb())
@@ -216,6 +223,13 @@ class Editor:
         self._change(lambda scene, name: changes.set_size(scene, name, half_extents), 'size of',
                      self.bones)
 
+    def _on_limits(self, limits: tuple[Limits | None, ...]) -> None:
+        self._change(lambda scene, name: changes.change_joint(scene, name, limits=limits),
+                     'range of', self.bones)
+
+    def _set_snap(self, snap: bool) -> None:
+        self.handles.snap = self.ranges.snap = snap
+
     def _change(self, change: Callable[[Scene, str], Scene], action: str,
                 bones: tuple[str, ...]) -> None:
         """Change bones, on both sides if so chosen, as one step; if refused, reset the handles."""
@@ -242,8 +256,6 @@ class Editor:
     def _set_editing(self, editing: bool) -> None:
         with self._display_lock:
             self.editing = editing
-            # The page may still tell how it was before: it has to see the pause first.
-            self._was_paused = False
             self.panel.show_editing(editing)
             self._show_mode()
 

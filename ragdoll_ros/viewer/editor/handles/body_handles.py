@@ -8,6 +8,7 @@ import numpy as np
 import viser
 
 from ....model import rotation
+from ....model.pose import Pose
 from ....model.ragdoll import Bone, Joint
 from ....model.scene import Placement, Scene, height
 from ....model.shapes import SHAPES
@@ -15,6 +16,7 @@ from ...drawing.bodies import WXYZ
 from ...drawing.meshes import MESHES
 from ..changes import find, joint_of
 from . import snapping
+from .joint_handles import JointHandles
 
 Mode = Literal['move', 'turn', 'size']
 """What the handles change."""
@@ -40,13 +42,13 @@ class BodyHandles:
     They are replaced only where they change: a drag of one that is replaced is lost.
 
     ``on_pose`` takes the new centre of mass (3,) m and orientation (4,), doll's frame;
-    ``on_size`` the new half extents (3,) m in the body's frame.
+    ``on_size`` the new half extents (3,) m in the body's frame. ``ranges`` are shown with them.
     """
 
-    def __init__(self, server: viser.ViserServer,
+    def __init__(self, server: viser.ViserServer, ranges: JointHandles,
                  on_pose: Callable[[np.ndarray, np.ndarray], None],
                  on_size: Callable[[np.ndarray], None]) -> None:
-        self._server = server
+        self._server, self._ranges = server, ranges
         self._on_pose, self._on_size = on_pose, on_size
         self.mode: Mode = 'move'
         self.snap = False
@@ -87,6 +89,8 @@ class BodyHandles:
             self._frame = self._add_outline(f'{self.root}/frame', bone)
             if joint is not None:
                 self._add_pivot(joint, bone)
+                self._ranges.show(self.root, Pose(origin, np.array(placement.orientation)),
+                                  placement.doll, joint)
             if self.mode != 'size':
                 self._add_body(bone, at)
             elif bone.shape.kind in SHAPES:
