@@ -23,6 +23,7 @@ from ragdoll_ros.files.scene import load_scene, save_scene  # noqa: E402
 from ragdoll_ros.fit.judging.finding import Finding  # noqa: E402
 from ragdoll_ros.fit.judging.verdict import Verdict  # noqa: E402
 from ragdoll_ros.model import errors, rotation  # noqa: E402
+from ragdoll_ros.model.ragdoll import joint_frame  # noqa: E402
 from ragdoll_ros.model.scene import above_ground  # noqa: E402
 from ragdoll_ros.physics.simulation import Simulation  # noqa: E402
 from ragdoll_ros.recordings.recording import Recording  # noqa: E402
@@ -32,7 +33,7 @@ from ragdoll_ros.viewer.editor.editor import Editor  # noqa: E402
 from ragdoll_ros.viewer.sources.playback import PlaybackSource  # noqa: E402
 from ragdoll_ros.viewer.sources.simulation import SimulationSource  # noqa: E402
 from ragdoll_ros.viewer.sources.source import RequestedData  # noqa: E402
-from ragdoll_ros.viewer.widgets.form import AMBER, GREEN, RED  # noqa: E402
+from ragdoll_ros.viewer.widgets.form import AMBER, GREEN, MIXED, RED  # noqa: E402
 
 DROP = load_scene('drop')
 
@@ -235,6 +236,109 @@ def test_the_root_has_no_joint_fields(desk):
     assert 'a bone of the list' in desk.panel.message.content
 
 
+def test_several_bones_are_edited_as_one_step(desk):
+    """What they share is shown, what differs is not applied until something is typed there."""
+    names = ('head', 'left_shin', 'left_thigh')
+    scene = changes.change_bone(DROP, 'head', friction=0.3)
+    desk.editor.show(scene)
+    for name in names:
+        desk.editor.select(name, add=True)
+    body, joint = desk.panel.body, desk.panel.joint
+    assert body['mass'].value == '5' and body['friction'].value == MIXED
+    assert not body['position'].visible and not joint['kind'].visible
+    assert joint['damping'].visible and '3 bones' in desk.panel.advice.content
+    body['mass'].value = '2.5'
+    joint['damping'].value = '0.75'
+    desk.editor.update()
+    edited = desk.editor.scene
+    assert [desk.bone(name).mass for name in names] == [2.5] * 3
+    assert [changes.joint_of(edited, name).damping for name in names] == [0.75] * 3
+    assert [desk.bone(name).friction for name in names] == [0.3, None, None]
+    assert {bone.mass for bone in edited.bones if bone.name not in names} == {
+        bone.mass for bone in DROP.bones if bone.name not in names}
+    body['friction'].value = '0.4'
+    desk.editor.update()
+    assert [desk.bone(name).friction for name in names] == [0.4] * 3
+    desk.editor.undo()
+    assert desk.editor.scene == edited and body['friction'].value == MIXED
+    desk.editor.undo()
+    assert desk.editor.scene == scene
+    body['friction'].value = '-1'
+    desk.editor.update()
+    assert set(errors_in(desk.panel)) == {'friction'} and desk.editor.scene == scene
+    desk.editor.select('head', add=True)
+    assert desk.editor.bones == names[1:]
+    desk.editor.select('head')
+    assert desk.editor.bones == ('head',) and body['position'].visible
+
+
+def test_several_bones_are_outlined_without_handles(server, desk):
+    desk.editor.toggle()
+    desk.editor.select('head')
+    desk.editor.select('left_shin', add=True)
+    handles = desk.editor.handles
+    assert handles.body is None and handles.size is None
+    for number, name in enumerate(('head', 'left_shin')):
+        frame = server.scene.get_handle_by_name(f'{handles.root}/{number}/frame')
+        assert tuple(frame.position) == pytest.approx(desk.bone(name).position)
+    desk.editor.select('head')
+    assert handles.body is not None
+
+
+def test_the_tree_has_each_bone_below_its_parent(server, tmp_path):
+    """Of the doll at hand, in a scene of several; names are text."""
+    doll = DROP.dolls[0].doll.renamed(lambda name: f'<b>{name}' if name == 'head' else name)
+    scene = dataclasses.replace(DROP, dolls=tuple(
+        dataclasses.replace(DROP.dolls[0], doll=doll, name=name) for name in ('one', 'two')))
+    desk = Desk(server, tmp_path, scene)
+    desk.editor.select('two/left_shin')
+    rows = re.findall('aria-level="(.)" aria-selected="(.*?)" data-bone="(.*?)"',
+                      desk.panel.tree._html.content)
+    assert len(rows) == len(doll.bones)
+    levels, seen = {}, []
+    for level, selected, name in rows:
+        name = html.unescape(name).removeprefix('two/')
+        levels[name] = int(level)
+        assert (selected == 'true') == (name == 'left_shin')
+        parent = next((joint.parent for joint in doll.joints if joint.child == name), None)
+        assert parent is None or (levels[name] == levels[parent] + 1 and parent in seen)
+        seen.append(name)
+    assert '<b>' not in desk.panel.tree._html.content
+
+
+def test_without_a_bone_one_is_chosen_or_added(desk):
+    assert 'Click on a bone' in desk.panel.advice.content and desk.panel.growth_folder.visible
+    assert desk.panel.add.label == 'Add a bone to torso' and not desk.panel.remove.visible
+    desk.editor.add_bone('tail')
+    assert desk.editor.bones == ('tail',)
+    assert changes.joint_of(desk.editor.scene, 'tail').parent == 'torso'
+    assert desk.panel.add.label == 'Add a bone here' and desk.panel.remove.visible
+
+
+def test_pairs_that_do_not_collide_are_typed(desk):
+    """Pairs of other bones stay; one that no bone has is refused at the field."""
+    doll = dataclasses.replace(DROP.dolls[0].doll, no_collision=(
+        ('left_shin', 'right_shin'), ('torso', 'left_shin')))
+    scene = dataclasses.replace(DROP, dolls=(dataclasses.replace(DROP.dolls[0], doll=doll),))
+    desk.editor.show(scene)
+    desk.editor.select('right_shin')
+    field = desk.panel.body['no_collision']
+    assert field.value == 'left_shin'
+    field.value = 'left_shin, head; torso'
+    desk.editor.update()
+    assert 'passes through must be' in errors_in(desk.panel)['no_collision']
+    field.value = 'left_shin, head, torso'
+    desk.editor.update()
+    pairs = {frozenset(pair) for pair in desk.editor.scene.dolls[0].doll.no_collision}
+    assert pairs == {frozenset(pair) for pair in (
+        ('left_shin', 'right_shin'), ('torso', 'left_shin'), ('right_shin', 'head'),
+        ('right_shin', 'torso'))}
+    assert len(desk.editor.scene.dolls[0].doll.no_collision) == 4
+    field.value = ''
+    desk.editor.update()
+    assert desk.editor.scene.dolls[0].doll.no_collision == (('torso', 'left_shin'),)
+
+
 def test_the_dropdown_chooses(desk):
     desk.panel.bone.value = 'head'
     assert desk.editor.bone == 'head' and desk.panel.body['radius'].value == '0.1'
@@ -376,6 +480,55 @@ def test_a_click_on_a_handle_changes_and_replaces_nothing(desk):
     drag(desk.editor.handles.body, np.add(start.position, (0, 0, 0.004)))
     assert desk.asked == asked and desk.editor.handles.root != root
     assert tuple(desk.editor.handles.body.position) == start.position
+
+
+@pytest.mark.parametrize(('name', 'edge', 'angle', 'limits'), [
+    ('left_shin', (0, 1), 90, [(0, 90)]), ('left_shin', (0, 0), -20, [(-20, 126)]),
+    ('head', (1, 0), -35, [(-60, 60), (-35, 60)])])
+def test_a_range_is_dragged_by_its_edges(desk, name, edge, angle, limits):
+    """To where the child would point: seen along the axis, its centre turned by that angle."""
+    desk.editor.select(name)
+    desk.editor.toggle()
+    joint, bone = changes.joint_of(DROP, name), desk.bone(name)
+    axis = np.array(joint.axes[edge[0]])
+    arm = rotation.rotate(rotation.from_axis_angle(axis, np.radians(angle)),
+                          np.subtract(bone.position, joint.anchor))
+    pointer = joint.anchor + arm
+    desk.editor.ranges.drag(edge, pointer + 2 * axis, pointer, False)
+    assert desk.editor.scene == DROP
+    desk.editor.ranges.drag(edge, pointer + 2 * axis, pointer, True)
+    wait(lambda: desk.editor.scene != DROP)
+    assert np.degrees(changes.joint_of(desk.editor.scene, name).limits) == pytest.approx(
+        np.array(limits))
+    desk.editor.undo()
+    assert desk.editor.scene == DROP
+
+
+def test_a_range_goes_in_steps_and_a_cone_stays_symmetric(desk):
+    """What a joint cannot have, a lower limit above the upper one, is not taken."""
+    desk.editor.select('left_shin')
+    desk.panel.joint['kind'].value = 'ball'
+    desk.editor.update()
+    desk.editor.toggle()
+    desk.panel.snap.value = True
+    joint, edge = changes.joint_of(desk.editor.scene, 'left_shin'), (0, 1)
+    assert set(desk.editor.ranges.spheres) == {(k, side) for k in range(3) for side in (0, 1)}
+    axis = rotation.matrix(joint_frame(joint))[:, 0]
+    arm = rotation.rotate(rotation.from_axis_angle(axis, np.radians(33)), np.subtract(
+        desk.bone('left_shin').position, joint.anchor))
+    before = desk.editor.scene
+    desk.editor.ranges.drag(edge, joint.anchor + arm + axis, joint.anchor + arm, True)
+    wait(lambda: desk.editor.scene != before)
+    swing, twist = np.degrees(changes.joint_of(desk.editor.scene, 'left_shin').limits)
+    assert swing == pytest.approx((-35, 35)) and twist == pytest.approx((-30, 30))
+    desk.editor.select('right_shin')
+    joint = changes.joint_of(desk.editor.scene, 'right_shin')
+    arm = np.subtract(desk.bone('right_shin').position, joint.anchor)
+    arm = rotation.rotate(rotation.from_axis_angle(joint.axes[0], np.radians(-40)), arm)
+    asked = list(desk.asked)
+    desk.editor.ranges.drag((0, 1), joint.anchor + arm + joint.axes[0], joint.anchor + arm, True)
+    desk.editor.redo()
+    assert desk.asked == asked
 
 
 def test_a_body_of_several_shapes_is_shown_moved_and_saved(server, desk):

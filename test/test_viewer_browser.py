@@ -389,6 +389,8 @@ def test_a_body_is_dragged_by_its_handle(view, height):
     choose(view, 'head')
     if view.button('Edit').count():
         view.press('Edit')
+    view.page.locator('.ragdoll-edit-banner').wait_for()
+    view.key('w')
     head = SCENE.bone_index('head')
     view.wait(lambda: np.allclose(view.page.evaluate(HANDLES) or np.inf, START[head], atol=1e-6))
     (x0, y0), (x1, y1) = view.pixels(START[head] + np.outer((height, height + 0.2), (0, 0, 1)))

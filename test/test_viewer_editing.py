@@ -195,3 +195,89 @@ def test_keys_mean_no_two_things(view):
     view.wait(lambda: abs(view.bodies(SCENE) - START).max() > 0.01)
     view.tab('Play')
     view.hold_at(SCENE, START)
+
+
+def row(view, name):
+    """The line of the tree with a bone."""
+    return view.page.locator(f'.ragdoll-tree [data-bone="{name}"]')
+
+
+def selected(view):
+    return set(view.page.locator('.ragdoll-tree [aria-selected=true]').all_text_contents())
+
+
+def test_bones_are_chosen_in_the_tree_and_in_the_picture(view):
+    """With Ctrl several, whose masses are changed and undone as one step; a child is indented."""
+    view.tab('Edit')
+    row(view, 'torso').click()
+    view.wait(lambda: selected(view) == {'torso'} and view.field('bone').input_value() == 'torso')
+    left = [row(view, name).evaluate('row => parseFloat(getComputedStyle(row).paddingLeft)')
+            for name in ('torso', 'left_thigh', 'left_shin')]
+    assert left == sorted(set(left))
+    row(view, 'left_shin').click(modifiers=['Shift'])
+    view.page.keyboard.down('Control')
+    index = SCENE.bone_index('head')
+    view.page.mouse.click(*view.pixels(START[index:index + 1])[0])
+    view.page.keyboard.up('Control')
+    names = {'torso', 'left_shin', 'head'}
+    view.wait(lambda: selected(view) == names)
+    view.see('3 bones are selected')
+    field = view.field('mass, kg')
+    assert field.input_value() == '(several)'
+    field.fill('6.5')
+    field.press('Enter')
+    view.see('Undo: numbers of 3 bones')
+    scene = saved(view)
+    assert [bone.mass == 6.5 for bone in scene.bones] == [
+        bone.name in names for bone in scene.bones]
+    view.press('Undo: numbers of 3 bones')
+    view.button('Undo').wait_for()
+    assert saved(view) == SCENE
+    row(view, 'head').click()
+    view.wait(lambda: selected(view) == {'head'})
+
+
+SPHERES = """() => {
+  const nodes = window.__viserMutable.nodeRefFromName;
+  const names = Object.keys(nodes).filter(name => /^.editor.*.limit_0_1$/.test(name)
+                                                  && nodes[name]);
+  if (names.length !== 1) return null;
+  nodes[names[0]].updateWorldMatrix(true, false);
+  const toWorld = nodes[''].matrixWorld.clone().invert();
+  return toWorld.multiply(nodes[names[0]].matrixWorld).elements.slice(12, 15);
+}"""
+"""Where the one sphere of an upper limit is drawn, m, z up."""
+
+
+def test_a_joint_range_is_dragged_by_its_edge(view):
+    """The knee's upper limit, seen from the side: to 90 degrees, where the shin is level behind."""
+    view.tab('Play')
+    view.page.mouse.click(20, 700)
+    view.key('e')
+    banner(view).wait_for()
+    row(view, BONE).click()
+    view.look((0, 3, 0.8), (0, 0.075, 0.6))
+    anchor, limit = np.array((0, 0.075, 0.625)), np.radians(126)
+    spoke = -np.array((np.sin(limit), 0, np.cos(limit)))
+    view.wait(lambda: view.page.evaluate(SPHERES))
+    view.wait(lambda: np.cross(np.subtract(view.page.evaluate(SPHERES), anchor), spoke)
+              == pytest.approx(0, abs=1e-6))
+    at = view.page.evaluate(SPHERES)
+    radius = np.subtract(at, anchor) @ spoke
+    assert radius > 0.2
+    view.wait(lambda: 0 < view.pixels([at])[0][0] < 900)
+    (x0, y0), (x1, y1) = view.pixels([at, anchor - radius * np.array((1, 0, 0))])
+    view.page.mouse.move(x0, y0)
+    view.page.mouse.down()
+    view.page.mouse.move(x1, y1, steps=10)
+    view.page.mouse.up()
+    view.see(f'Undo: range of {BONE}')
+    scene = saved(view)
+    low, high = np.degrees(changes.joint_of(scene, BONE).limits[0])
+    assert low == 0 and high == pytest.approx(90, abs=1.5)
+    assert changes.change_joint(scene, BONE, limits=changes.joint_of(
+        SCENE, BONE).limits) == SCENE
+    view.press(f'Undo: range of {BONE}')
+    view.button('Undo').wait_for()
+    view.key('h')
+    run(view)

@@ -113,6 +113,7 @@ class Page:
         self.controls.pushes.update(time.monotonic())
         frame = self.source.frame if is_open else None
         if is_open:
+            was_editing = self.editor is not None and self.editor.editing
             frames, status = self.source.take_frames(), self.source.status
             start, now = self.start_when_visible, time.monotonic()
             for new in frames:
@@ -125,7 +126,7 @@ class Page:
                                        skins=self.display.skin.value)
                 self.stage.set_dark(self.display.dark.value)
             if self.editor is not None:
-                self.editor.update_paused(status.paused)
+                self.editor.update_paused(status.paused, was_editing)
             self._show_messages(status.problem, status.note)
             self.controls.show(status)
         if self.start_when_visible is not None:
@@ -162,11 +163,11 @@ class Page:
             doll_mean(frame.scene, pushes.bone, frame.state.positions),
             pushes.motion.doll_velocity(pushes.bone))
 
-    def _select(self, bone: str) -> None:
-        """Push a bone that was clicked from now on, and edit it."""
+    def _select(self, bone: str, add: bool) -> None:
+        """Push a bone that was clicked from now on, and edit it; ``add``: besides others."""
         self.controls.pushes.choose(bone)
         if self.editor is not None:
-            self.editor.select(bone)
+            self.editor.select(bone, add)
 
     def _grabbable_frame(self) -> Frame | None:
         """The shown frame; None if it is in the past, where nothing can be grabbed."""

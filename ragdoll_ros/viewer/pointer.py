@@ -27,14 +27,20 @@ PING_TIMEOUT = 2.5
 """s: with PING_PERIOD, as long as a node waits for a client that drags."""
 
 
+ADDING = ('cmd/ctrl', 'shift')
+"""Keys with which a click selects a bone besides others."""
+
+
 class Pointer:
     """Drags and clicks of all pages; each page has a hand of its own.
+
+    ``select`` takes the name of a bone that is clicked, and whether it is added to others.
 
     Viser's callbacks are coroutines here, so that they run in order; they must not block.
     """
 
     def __init__(self, source: Source, grabbable_frame: Callable[[], Frame | None],
-                 select: Callable[[str], None],
+                 select: Callable[[str, bool], None],
                  refuse: Callable[[viser.ClientHandle], None] = lambda _: None) -> None:
         self._source, self._frame, self._select = source, grabbable_frame, select
         self._refuse = refuse
@@ -69,10 +75,11 @@ class Pointer:
             eye, direction = np.array(event.ray_origin), np.array(event.ray_direction)
             point = eye + direction * self._depth(eye, direction)
             bone = bone_of(event.instance_index, point)
-            self._select(frame.scene.bone_names[bone])
+            self._select(frame.scene.bone_names[bone], event.modifier is not None)
 
         handle.on_drag('left')(on_drag)
-        handle.on_click(on_click)
+        for modifier in (None, *ADDING):
+            handle.on_click(modifier=modifier)(on_click)
 
     def _grab(self, event: viser.SceneNodeDragEvent, bone: int, point: np.ndarray) -> None:
         frame = self._frame()

@@ -92,14 +92,15 @@ class _RangeArcs:
             for joint in doll.joints:
                 parent = doll.bone(joint.parent)
                 into_parent = rotation.inverse(parent.orientation)
-                local_axes = rotation.rotate(into_parent, _axes(joint))
+                local_axes = rotation.rotate(into_parent, angle_axes(joint))
                 for order, pair in enumerate(joint.angle_limits):
                     if pair:
-                        needle = rotation.rotate(into_parent, _needle(doll, joint, order))
+                        needle = rotation.rotate(into_parent, child_needle(doll, joint, order))
                         arcs.append((len(parents), order, angle + order, pair,
-                                      _arc(local_axes[order], needle, pair), needle))
+                                      range_arc(local_axes[order], needle, pair), needle))
                 if joint.kind == 'ball' and all(joint.angle_limits[:2]):
-                    cones.append((len(parents), rotation.rotate(into_parent, _rim(doll, joint))))
+                    rim = rotation.rotate(into_parent, cone_rim(doll, joint))
+                    cones.append((len(parents), rim))
                 parents.append(first + doll.bones.index(parent))
                 anchors.append(rotation.rotate(into_parent,
                                                np.subtract(joint.anchor, parent.position)))
@@ -145,7 +146,7 @@ class _RangeArcs:
         return np.concatenate([cones, arcs, np.stack([needles, needles], axis=1)])
 
 
-def _axes(joint: Joint) -> np.ndarray:
+def angle_axes(joint: Joint) -> np.ndarray:
     """Axes (3, 3) of a joint's angles in the bind pose, doll's frame; zero beyond its angles."""
     if joint.kind == 'ball':
         return rotation.matrix(joint_frame(joint)).T
@@ -154,9 +155,9 @@ def _axes(joint: Joint) -> np.ndarray:
     return axes
 
 
-def _needle(doll: Ragdoll, joint: Joint, order: int) -> np.ndarray:
+def child_needle(doll: Ragdoll, joint: Joint, order: int) -> np.ndarray:
     """Needle (3,) m from anchor to child, normal to the axis; bind pose, doll's frame."""
-    child, axis = doll.bone(joint.child), _axes(joint)[order]
+    child, axis = doll.bone(joint.child), angle_axes(joint)[order]
     toward = np.subtract(child.position, joint.anchor)
     toward = toward - axis * (axis @ toward)
     if np.linalg.norm(toward) < 1e-6:
@@ -164,13 +165,13 @@ def _needle(doll: Ragdoll, joint: Joint, order: int) -> np.ndarray:
     return rotation.normalized(toward) * np.clip(max(child.shape.half_extents), *NEEDLE_LENGTHS)
 
 
-def _arc(axis: np.ndarray, needle: np.ndarray, pair: tuple[float, float]) -> np.ndarray:
+def range_arc(axis: np.ndarray, needle: np.ndarray, pair: tuple[float, float]) -> np.ndarray:
     """Points (ARC_SEGMENTS + 1, 3) m of the needle's tip over the range."""
     angles = np.linspace(*pair, ARC_SEGMENTS + 1)
     return rotation.rotate(rotation.from_rotation_vector(angles[:, None] * axis), needle)
 
 
-def _rim(doll: Ragdoll, joint: Joint) -> np.ndarray:
+def cone_rim(doll: Ragdoll, joint: Joint) -> np.ndarray:
     """Rim (RIM + 1, 3) m of a ball joint's cone from the anchor, at the needles' length.
 
     Bind pose of the parent, doll's frame.
@@ -179,7 +180,7 @@ def _rim(doll: Ragdoll, joint: Joint) -> np.ndarray:
     along = np.linspace(0, 4, RIM + 1)
     x = np.interp(along, range(5), (low_x, high_x, high_x, low_x, low_x))
     y = np.interp(along, range(5), (low_y, low_y, high_y, high_y, low_y))
-    axes, child = _axes(joint), doll.bone(joint.child)
+    axes, child = angle_axes(joint), doll.bone(joint.child)
     ahead = axes[2] * np.copysign(1.0, axes[2] @ np.subtract(child.position, joint.anchor))
     turns = rotation.multiply(rotation.from_rotation_vector(x[:, None] * axes[0]),
                               rotation.from_rotation_vector(y[:, None] * axes[1]))

@@ -17,10 +17,13 @@ from ...model.scene import Scene
 from ...model.shapes import SHAPES, SIZES, Shape
 from ...model.vectors import unit_vector
 from ..widgets import parsing
-from ..widgets.form import Field, FieldValue, FormValues
+from ..widgets.form import MIXED, Field, FieldValue, FormValues
 from . import changes
 
 SURFACE = ('friction', 'rolling_friction', 'restitution')
+
+SHARED = ('mass', *SURFACE, 'color', 'damping')
+"""Fields that several bones can have in common."""
 
 MAXIMA = {'mass': 1e6, 'size': 1e3, 'radius': 1e3, 'length': 1e3, 'position': 1e3, 'anchor': 1e3,
           'damping': 1e4}
@@ -42,7 +45,9 @@ BODY = (
     Field('friction', 'friction', 'text', "coefficient, inf for no slip; empty: the scene's"),
     Field('rolling_friction', 'rolling, m', 'text', "lever arm; empty: the scene's"),
     Field('restitution', 'restitution', 'text', "0 to 1; empty: the scene's"),
-    Field('color', 'colour', 'color', 'picked, or typed: red, #1e90ff, 30 144 255'))
+    Field('color', 'colour', 'color', 'picked, or typed: red, #1e90ff, 30 144 255'),
+    Field('no_collision', 'passes through', 'text', 'names of other bones of the doll, with which '
+          'this one does not collide; those that a joint connects never do'))
 
 JOINT = (
     Field('kind', 'joint', 'joint', 'to the parent'),
@@ -68,8 +73,21 @@ def read_bone(scene: Scene, name: str) -> FormValues:
     for key in SURFACE:
         value = getattr(bone, key)
         values[key] = '' if value is None else f'{value:.9g}'
+    values['no_collision'] = _join_names(_passed_through(scene, name))
     joint = changes.joint_of(scene, name)
     return values if joint is None else {**values, **_read_joint(joint)}
+
+
+def read_bones(scene: Scene, names: Sequence[str]) -> FormValues:
+    """Values of one bone, or those that several share; MIXED where they differ."""
+    each = [read_bone(scene, name) for name in names]
+    if len(each) == 1:
+        return each[0]
+    shared = {key: [values[key] for values in each] for key in SHARED
+              if all(key in values for values in each)}
+    same = {key: all(value == values[0] for value in values) for key, values in shared.items()}
+    return {key: values[0] if same[key] else MIXED for key, values in shared.items()
+            if same[key] or key != 'color'}
 
 
 def apply_values(scene: Scene, name: str, values: Mapping[str, FieldValue], limb: bool = False,
@@ -118,6 +136,8 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
             (('rotation',), lambda scene, new: changes.set_pose(
                 scene, name, orientation=_quaternion(new['rotation']), limb=limb)),
             (('color',), color),
+            (('no_collision',), lambda scene, new: changes.set_no_collision(
+                scene, name, _split_names(new['no_collision']))),
             *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
               for key in SURFACE)]
 
@@ -201,6 +221,25 @@ def _number_or_none(key: str, text: str) -> float | None:
         return None
     unit = 'm' if key == 'rolling_friction' else ''
     return parsing.parse_number(text, unit, infinite=key == 'friction')
+
+
+def _passed_through(scene: Scene, name: str) -> list[str]:
+    """Names of the bones with which a bone does not collide by ``no_collision``."""
+    placement, bone = changes.find(scene, name)
+    return [other for pair in placement.doll.no_collision if bone.name in pair
+            for other in pair if other != bone.name]
+
+
+def _split_names(text: str) -> list[str]:
+    """Names between commas, or between semicolons if there are any."""
+    parts = text.split(';' if ';' in text else ',')
+    return [part.strip() for part in parts if part.strip()]
+
+
+def _join_names(names: Sequence[str]) -> str:
+    if not any(',' in name for name in names):
+        return ', '.join(names)
+    return '; '.join(names) + ';' * (len(names) == 1)
 
 
 def _shape(new: FormValues) -> Shape:

@@ -18,7 +18,15 @@ from contextlib import contextmanager
 import numpy as np
 
 from ...model import errors, rotation
-from ...model.ragdoll import JOINT_KINDS, MAX_SWING, Bone, Joint, Ragdoll, SkeletonFrame
+from ...model.ragdoll import (
+    JOINT_KINDS,
+    MAX_SWING,
+    Bone,
+    Joint,
+    Ragdoll,
+    SkeletonFrame,
+    no_collision_errors,
+)
 from ...model.scene import Placement, Scene
 from ...model.shapes import SHAPES, Box, Shape, Sphere
 from ...model.swing import Swing
@@ -87,6 +95,24 @@ def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
                    for rider in placement.doll.riders)
     return replace_doll(scene, placement, riders=riders,
                         bones=_replaced(placement.doll.bones, bone, moved))
+
+
+def set_no_collision(scene: Scene, name: str, others: Sequence[str]) -> Scene:
+    """Let a bone not collide with these bones of its doll, beside those that joints connect."""
+    placement, bone = find(scene, name)
+    doll = placement.doll
+    before = [pair for pair in doll.no_collision if bone.name in pair]
+    kept = tuple(pair for pair in doll.no_collision if pair not in before)
+    had = {other for pair in before for other in pair if other != bone.name}
+    with _errors_at(name):
+        found = no_collision_errors([each.name for each in doll.bones],
+                                    [(bone.name, other) for other in others])
+        if found:
+            raise found[0]
+    # Pairs that were there stay as they are.
+    kept += tuple(pair for pair in before if set(pair) - {bone.name} <= set(others))
+    new = tuple((bone.name, other) for other in dict.fromkeys(others) if other not in had)
+    return replace_doll(scene, placement, no_collision=kept + new)
 
 
 def set_size(scene: Scene, name: str, half_extents: Sequence[float]) -> Scene:

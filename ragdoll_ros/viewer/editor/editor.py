@@ -11,6 +11,7 @@ import numpy as np
 import viser
 
 from ...model import errors
+from ...model.ragdoll import Limits
 from ...model.scene import Scene
 from ..browser.scripts import add_listener
 from ..viser_internals import handle_id
@@ -21,6 +22,7 @@ from .banner import MODES, Banner
 from .edited_scene import EditedScene, Reason
 from .files_panel import FilesPanel
 from .handles.body_handles import BodyHandles, Mode
+from .handles.joint_handles import JointHandles
 from .panel import EditorPanel
 from .scene_folder import SceneFolder
 
@@ -47,11 +49,13 @@ class Editor:
         self._in_order = ThreadPoolExecutor(1)
         """Runs what is entered by keys, one after the other."""
         self._was_paused = False
-        self.bone: str | None = None
-        """Name of the selected bone."""
+        self.bones: tuple[str, ...] = ()
+        """Names of the selected bones, the last one that was selected at the end."""
         self.editing = False
         """Whether the source is paused in the bind pose."""
-        self.handles = BodyHandles(server, self._on_pose, self._on_size)
+        self.ranges = JointHandles(server, lambda limits: self._in_order.submit(
+            self._on_limits, limits))
+        self.handles = BodyHandles(server, self.ranges, self._on_pose, self._on_size)
         self.panel = EditorPanel(server.gui, self.select, self.suggest)
         self._connect(server.gui)
         with server.gui.add_folder('Files'):
@@ -67,12 +71,23 @@ class Editor:
         """Take note that the page shows another scene."""
         self._edited.show(scene)
 
-    def select(self, bone: str | None) -> None:
-        """Select a bone by its name in the scene; an unknown name or None deselects."""
+    @property
+    def bone(self) -> str | None:
+        """Name of the bone that was selected last."""
+        return self.bones[-1] if self.bones else None
+
+    def select(self, bone: str | None, add: bool = False) -> None:
+        """Select a bone by its name in the scene; an unknown name or None deselects all.
+
+        ``add``: besides those that are selected; one that is selected is deselected.
+        """
         with self._display_lock:
-            bone = bone if bone in self.scene.bone_names else None
-            if bone != self.bone:
-                self.bone = bone
+            bones = (bone,) if bone in self.scene.bone_names else ()
+            if add:
+                others = tuple(each for each in self.bones if each != bone)
+                bones = others if bone in self.bones else others + bones
+            if bones != self.bones:
+                self.bones = bones
                 self._refresh()
 
     def toggle(self) -> None:
@@ -91,9 +106,12 @@ class Editor:
             self.handles.mode = mode
             self._show_mode()
 
-    def update_paused(self, paused: bool) -> None:
-        """Take note whether the source is paused: if it was resumed elsewhere, editing ends."""
-        if self._was_paused and not paused and self.editing:
+    def update_paused(self, paused: bool, was_editing: bool = True) -> None:
+        """Take note whether the source is paused: if it was resumed elsewhere, editing ends.
+
+        ``was_editing``: before that was asked; else it tells how it was before editing.
+        """
+        if self._was_paused and not paused and was_editing and self.editing:
             self._set_editing(False)
         self._was_paused = paused
 
@@ -133,15 +151,17 @@ class Editor:
     def show_handles(self) -> None:
         """Show handles on the selected bone while editing, otherwise none."""
         with self._display_lock:
-            if self.editing and self.bone is not None:
-                self.handles.show(self.scene, self.bone, self.panel.limb.value)
+            if self.editing and len(self.bones) == 1:
+                self.handles.show(self.scene, self.bones[0], self.panel.limb.value)
+            elif self.editing and self.bones:
+                self.handles.show_outlines(self.scene, self.bones)
             else:
                 self.handles.hide()
 
     def add_bone(self, name: str) -> None:
-        """Add a bone at the end of the selected one, and select it."""
+        """Add a bone at the end of the selected one, or of the root, and select it."""
         with self._reporting_errors():
-            parent, name = _existing(self.bone), name.strip()
+            parent, name = self.panel.parent, name.strip()
             self.set_scene(changes.add_bone(self.scene, parent, name), f'add {name}')
             placement, _ = changes.find(self.scene, parent)
             self.select(self.scene.qualified(placement, name))
@@ -157,7 +177,7 @@ class Editor:
         panel = self.panel
         self._banner.on_action = self._on_action
         panel.limb.on_update(lambda _: self.show_handles())
-        panel.snap.on_update(lambda _: setattr(self.handles, 'snap', panel.snap.value))
+        panel.snap.on_update(lambda _: self._set_snap(panel.snap.value))
         panel.update.on_click(lambda _: self.update())
         panel.add.on_click(lambda _: self.add_bone(panel.name.value))
         panel.remove.on_click(lambda _: self.remove_limb())
@@ -185,32 +205,44 @@ class Editor:
         elif field == handle_id(self.panel.name):
             self._in_order.submit(self.add_bone, self.panel.name.value)
 
-    def _typed(self) -> tuple[str | None, FormValues, list[errors.ModelError]]:
-        """The selected bone, the values of the form, and errors of those that cannot be read."""
+    def _typed(self) -> tuple[tuple[str, ...], FormValues, list[errors.ModelError]]:
+        """The selected bones, the values of the form, and errors of those that cannot be read."""
         with self._display_lock:
-            return self.bone, *self.panel.values()
+            return self.bones, *self.panel.values()
 
-    def _apply(self, bone: str | None, values: FormValues, found: list[errors.ModelError]) -> None:
-        self._change(lambda name: bone_form.apply_values(
-            self.scene, name, values, self.panel.limb.value, found), 'numbers of', bone)
+    def _apply(self, bones: tuple[str, ...], values: FormValues,
+               found: list[errors.ModelError]) -> None:
+        self._change(lambda scene, name: bone_form.apply_values(
+            scene, name, values, self.panel.limb.value, found), 'numbers of', bones)
 
     def _on_pose(self, position: np.ndarray, orientation: np.ndarray) -> None:
-        self._change(lambda name: changes.set_pose(
-            self.scene, name, position, orientation, self.panel.limb.value), 'move', self.bone)
+        self._change(lambda scene, name: changes.set_pose(
+            scene, name, position, orientation, self.panel.limb.value), 'move', self.bones)
 
     def _on_size(self, half_extents: np.ndarray) -> None:
-        self._change(lambda name: changes.set_size(self.scene, name, half_extents), 'size of',
-                     self.bone)
+        self._change(lambda scene, name: changes.set_size(scene, name, half_extents), 'size of',
+                     self.bones)
 
-    def _change(self, change: Callable[[str], Scene], action: str, bone: str | None) -> None:
-        """Change a bone, on both sides if so chosen; if that is refused, reset the handles."""
+    def _on_limits(self, limits: tuple[Limits | None, ...]) -> None:
+        self._change(lambda scene, name: changes.change_joint(scene, name, limits=limits),
+                     'range of', self.bones)
+
+    def _set_snap(self, snap: bool) -> None:
+        self.handles.snap = self.ranges.snap = snap
+
+    def _change(self, change: Callable[[Scene, str], Scene], action: str,
+                bones: tuple[str, ...]) -> None:
+        """Change bones, on both sides if so chosen, as one step; if refused, reset the handles."""
         with self._reporting_errors():
-            name = _existing(bone)
+            last = _existing(bones[-1] if bones else None)
+            scene = self.scene
             try:
-                scene = change(name)
-                if self.panel.both.value:
-                    scene = mirror.mirrored(scene, name, self.panel.limb.value)
-                self.set_scene(scene, f'{action} {name}')
+                for name in bones:
+                    scene = change(scene, name)
+                    if self.panel.both.value:
+                        scene = mirror.mirrored(scene, name, self.panel.limb.value)
+                self.set_scene(scene, f'{action} ' + (
+                    last if len(bones) == 1 else f'{len(bones)} bones'))
             except errors.RagdollError:
                 self.handles.reset()
                 raise
@@ -224,8 +256,6 @@ class Editor:
     def _set_editing(self, editing: bool) -> None:
         with self._display_lock:
             self.editing = editing
-            # The page may still tell how it was before: it has to see the pause first.
-            self._was_paused = False
             self.panel.show_editing(editing)
             self._show_mode()
 
@@ -236,14 +266,14 @@ class Editor:
     def _refresh(self, keep_typed: bool = False) -> None:
         """Show the current scene and the selected bone; ``keep_typed``: see Form.fill."""
         scene = self.scene
-        if self.bone not in scene.bone_names:
-            self.bone, keep_typed = None, False
-        self.panel.show_bones(scene, self.bone)
+        bones = tuple(bone for bone in self.bones if bone in scene.bone_names)
+        keep_typed = keep_typed and bones == self.bones
+        self.bones = bones
+        self.panel.show_bones(scene, bones)
         self.panel.show_history(self._edited.history)
-        joint = None if self.bone is None else changes.joint_of(scene, self.bone)
-        self.panel.show_values(
-            None if self.bone is None else bone_form.read_bone(scene, self.bone),
-            joint and joint.parent, keep_typed)
+        joints = [changes.joint_of(scene, bone) for bone in bones]
+        self.panel.show_values(bone_form.read_bones(scene, bones) if bones else {},
+                               [joint.parent for joint in joints if joint], keep_typed)
         self.show_handles()
 
     @contextmanager

@@ -1,15 +1,16 @@
 """The editor's panel: selection of a bone, the form of it and its joint, and actions."""
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import viser
 
 from ...model import errors
 from ...model.scene import Scene
 from ..browser.scripts import style
+from ..widgets.bone_tree import BoneTree
 from ..widgets.error_text import error_text
-from ..widgets.form import RED, CallbackGuard, Form, FormValues, colored
+from ..widgets.form import GREY, RED, CallbackGuard, Form, FormValues, colored
 from .bone_form import BODY, JOINT
 from .undo_history import UndoHistory
 
@@ -21,10 +22,11 @@ KEYS = {field.key for field in (*BODY, *JOINT)}
 class EditorPanel:
     """Widgets in the GUI container that is current; the editor connects the buttons.
 
-    ``select`` takes the name of a selected bone, or None; ``suggest`` is a Form's ``on_kind``.
+    ``select`` takes the name of a bone, or None, and whether other selected bones stay selected;
+    ``suggest`` is a Form's ``on_kind``.
     """
 
-    def __init__(self, gui: viser.GuiApi, select: Callable[[str | None], None],
+    def __init__(self, gui: viser.GuiApi, select: Callable[[str | None, bool], None],
                  suggest: Callable[[str, str], None]) -> None:
         self._filling = CallbackGuard()
         self.edit = gui.add_button('Edit', icon='pencil',
@@ -33,6 +35,8 @@ class EditorPanel:
         self.redo = gui.add_button('Redo', icon='arrow-forward-up', hint='Ctrl+Shift+Z')
         self.doll = gui.add_dropdown('doll', (NONE,), visible=False, hint='selects its root')
         self.bone = gui.add_dropdown('bone', (NONE,), hint='or click on it')
+        self.tree = BoneTree(gui, select)
+        self.advice = gui.add_html('')
         self.limb = gui.add_checkbox('whole limb', False, hint='the subtree of the bone '
                                      'moves with it; else the body alone, and joints stay')
         self.both = gui.add_checkbox('both sides', False,
@@ -54,33 +58,46 @@ class EditorPanel:
             self.name = gui.add_text('name', 'new bone')
             self.add = gui.add_button('Add a bone here', icon='plus')
             self.remove = gui.add_button('Remove this limb', icon='trash')
+        self.parent = ''
+        """Bone to which another one is added."""
         self._roots: dict[str, str] = {}
         self.doll.on_update(lambda _: self._filling.active or select(
-            self._roots.get(self.doll.value)))
+            self._roots.get(self.doll.value), False))
         self.bone.on_update(lambda _: self._filling.active or select(
-            None if self.bone.value == NONE else self.bone.value))
+            None if self.bone.value == NONE else self.bone.value, False))
 
-    def show_bones(self, scene: Scene, selected: str | None) -> None:
-        """List all dolls, and the bones of one: that of the selected bone, or the first."""
-        index = 0 if selected is None else int(scene.doll_of_bone[scene.bone_index(selected)])
-        self._roots = {placement.name: scene.qualified(placement, placement.doll.root.name)
-                       for placement in scene.dolls}
+    def show_bones(self, scene: Scene, selected: Sequence[str]) -> None:
+        """List all dolls, and the bones of one: that of the last selected bone, or the first."""
+        last = selected[-1] if selected else None
+        index = 0 if last is None else int(scene.doll_of_bone[scene.bone_index(last)])
+        placement = scene.dolls[index]
+        self._roots = {each.name: scene.qualified(each, each.doll.root.name)
+                       for each in scene.dolls}
         self.doll.visible = len(scene.dolls) > 1
         with self._filling:
-            _set_options(self.doll, tuple(self._roots), scene.dolls[index].name)
+            _set_options(self.doll, tuple(self._roots), placement.name)
             _set_options(self.bone, (NONE, *scene.bone_names[scene.bone_slices[index]]),
-                         selected or NONE)
+                         last or NONE)
+        self.tree.show(scene, placement, selected)
+        self.advice.content = colored(_advice(selected), GREY)
+        self.parent = last or self._roots[placement.name]
+        self.add.label = 'Add a bone here' if last else f'Add a bone to {placement.doll.root.name}'
 
-    def show_values(self, values: FormValues | None, parent: str | None, keep_typed: bool) -> None:
-        """Show a bone's values, or hide the form; ``keep_typed``: see Form.fill."""
+    def show_values(self, values: FormValues, parents: Sequence[str], keep_typed: bool) -> None:
+        """Show the values of the selected bones, whose ``parents`` are these, or hide the form.
+
+        ``keep_typed``: see Form.fill.
+        """
         self.show_message('')
-        for part in (self.body_folder, self.growth_folder, self.update, self.limb, self.both,
-                     self.snap):
-            part.visible = values is not None
-        self.joint_folder.visible = values is not None and 'kind' in values
-        self.joint_folder.label = f'Joint to {parent}'
-        self.body.fill(values or {}, keep_typed)
-        self.joint.fill(values or {}, keep_typed)
+        is_one = 'position' in values
+        for part in (self.body_folder, self.update, self.both):
+            part.visible = bool(values)
+        for part in (self.limb, self.snap, self.remove):
+            part.visible = is_one
+        self.joint_folder.visible = 'damping' in values
+        self.joint_folder.label = f'Joint to {parents[0]}' if is_one and parents else 'Joints'
+        self.body.fill(values, keep_typed)
+        self.joint.fill(values, keep_typed)
 
     def has(self, widget_id: str) -> bool:
         """Whether a widget with this id is a field of the form."""
@@ -121,6 +138,15 @@ class EditorPanel:
         """Label the button 'Edit', or 'Run' while editing."""
         self.edit.label = 'Run' if editing else 'Edit'
         self.edit.icon = 'player-play' if editing else 'pencil'
+
+
+def _advice(selected: Sequence[str]) -> str:
+    """What can be done with the selection."""
+    if not selected:
+        return ('Click on a bone in the picture or in this tree to edit it. '
+                'Ctrl+click selects several. Below, add a bone.')
+    return '' if len(selected) == 1 else (
+        f'{len(selected)} bones are selected: a value applies to all of them')
 
 
 def _set_options(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...], value: str) -> None:

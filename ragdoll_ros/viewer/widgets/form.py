@@ -27,6 +27,9 @@ TYPED = (*NUMBERS, 'text')
 RED, AMBER, GREEN, GREY = (f'var(--ragdoll-{name})' for name in ('red', 'amber', 'green', 'grey'))
 
 
+MIXED = '(several)'
+"""Value and text of a field that stands for different values; not read until it is changed."""
+
 FieldValue = str | float | tuple[float, ...]
 FormValues = dict[str, FieldValue]
 """Values by the keys of their fields."""
@@ -124,8 +127,8 @@ class Form:
         found = []
         with self._lock:
             for key, widget in self._widgets.items():
-                if widget.visible:
-                    text = widget.value
+                text = widget.value
+                if widget.visible and not text == MIXED == self._filled[key][1]:
                     try:
                         values[key] = self._read(key, text)
                         self._submitted[key] = text, values[key]
@@ -174,7 +177,7 @@ class Form:
         if kind == 'color':
             self._colors[key] = value
         text: Any = value
-        if kind in NUMBERS:
+        if kind in NUMBERS and value != MIXED:
             with suppress(errors.ModelError):
                 if self._read(key, widget.value) == value:
                     self._filled[key] = widget.value, value

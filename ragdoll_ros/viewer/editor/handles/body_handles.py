@@ -8,6 +8,7 @@ import numpy as np
 import viser
 
 from ....model import rotation
+from ....model.pose import Pose
 from ....model.ragdoll import Bone, Joint
 from ....model.scene import Placement, Scene, height
 from ....model.shapes import SHAPES
@@ -15,6 +16,7 @@ from ...drawing.bodies import WXYZ
 from ...drawing.meshes import MESHES
 from ..changes import find, joint_of
 from . import snapping
+from .joint_handles import JointHandles
 
 Mode = Literal['move', 'turn', 'size']
 """What the handles change."""
@@ -40,13 +42,13 @@ class BodyHandles:
     They are replaced only where they change: a drag of one that is replaced is lost.
 
     ``on_pose`` takes the new centre of mass (3,) m and orientation (4,), doll's frame;
-    ``on_size`` the new half extents (3,) m in the body's frame.
+    ``on_size`` the new half extents (3,) m in the body's frame. ``ranges`` are shown with them.
     """
 
-    def __init__(self, server: viser.ViserServer,
+    def __init__(self, server: viser.ViserServer, ranges: JointHandles,
                  on_pose: Callable[[np.ndarray, np.ndarray], None],
                  on_size: Callable[[np.ndarray], None]) -> None:
-        self._server = server
+        self._server, self._ranges = server, ranges
         self._on_pose, self._on_size = on_pose, on_size
         self.mode: Mode = 'move'
         self.snap = False
@@ -57,20 +59,20 @@ class BodyHandles:
         """Node of the current handles. The name is new each time: viser keeps the old pose of a
         node that is added again at the origin."""
         self._count = 0
-        self._shown: tuple | None = None
+        self._shown: object = None
         """What the handles depend on."""
         self._reset: Callable[[], None] = lambda: None
 
     def hide(self) -> None:
         """Remove all handles."""
-        if self.body is not None:
+        if self._shown is not None:
             self._server.scene.remove_by_name(self.root)
         self.body = self.size = self._shown = None
 
     def reset(self) -> None:
         """Put the handles back after a drag that has changed nothing."""
         if self._shown is not None:
-            self._shown = None
+            self.hide()
             self._reset()
 
     def show(self, scene: Scene, name: str, limb: bool) -> None:
@@ -80,32 +82,55 @@ class BodyHandles:
         shown = name, self.mode, limb, *origin, placement.orientation, bone, joint
         if shown == self._shown:
             return
-        self.hide()
-        self._shown, self._reset = shown, lambda: self.show(scene, name, limb)
-        self._count += 1
-        self.root = f'{ROOT}/{self._count}'
+        self._begin(shown, lambda: self.show(scene, name, limb))
         at = joint.anchor if limb and joint else bone.position
         with self._server.atomic():
-            self._server.scene.add_frame(
-                self.root, position=origin, wxyz=_wxyz(placement.orientation), show_axes=False)
-            self._frame = self._server.scene.add_frame(
-                f'{self.root}/frame', position=bone.position, wxyz=_wxyz(bone.orientation),
-                show_axes=False)
-            self._add_outline(bone)
+            self._add_frame(self.root, origin, placement.orientation)
+            self._frame = self._add_outline(f'{self.root}/frame', bone)
             if joint is not None:
                 self._add_pivot(joint, bone)
+                self._ranges.show(self.root, Pose(origin, np.array(placement.orientation)),
+                                  placement.doll, joint)
             if self.mode != 'size':
                 self._add_body(bone, at)
             elif bone.shape.kind in SHAPES:
                 self._add_size(bone)
 
-    def _add_outline(self, bone: Bone) -> None:
+    def show_outlines(self, scene: Scene, names: Sequence[str]) -> None:
+        """Show the outlines of several bones, without handles."""
+        found = [find(scene, name) for name in names]
+        if found == self._shown:
+            return
+        self._begin(found, lambda: self.show_outlines(scene, names))
+        with self._server.atomic():
+            self._add_frame(self.root, (0.0, 0.0, 0.0), rotation.IDENTITY)
+            for number, (placement, bone) in enumerate(found):
+                node = f'{self.root}/{number}'
+                self._add_frame(node, placement.position + _lift(scene, placement),
+                                placement.orientation)
+                self._add_outline(f'{node}/frame', bone)
+
+    def _begin(self, shown: object, reset: Callable[[], None]) -> None:
+        """Begin a new root, for handles that depend on ``shown``."""
+        self.hide()
+        self._shown, self._reset = shown, reset
+        self._count += 1
+        self.root = f'{ROOT}/{self._count}'
+
+    def _add_frame(self, node: str, position: Sequence[float],
+                   orientation: Sequence[float]) -> viser.FrameHandle:
+        return self._server.scene.add_frame(node, position=position, wxyz=_wxyz(orientation),
+                                            show_axes=False)
+
+    def _add_outline(self, node: str, bone: Bone) -> viser.FrameHandle:
+        frame = self._add_frame(node, bone.position, bone.orientation)
         for number, part in enumerate(bone.shape.primitives):
             vertices, faces = MESHES[part.kind]
             self._server.scene.add_mesh_simple(
-                f'{self.root}/frame/outline_{number}', vertices * part.size * OUTLINE_SCALE, faces,
+                f'{node}/outline_{number}', vertices * part.size * OUTLINE_SCALE, faces,
                 color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False,
                 position=part.position, wxyz=_wxyz(part.orientation))
+        return frame
 
     def _add_pivot(self, joint: Joint, bone: Bone) -> None:
         """Draw the joint: a sphere at its anchor, a line along each axis, the first in blue."""
