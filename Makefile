@@ -25,7 +25,7 @@ else
 VENV_FLAGS := --system-site-packages
 endif
 
-.PHONY: help run test pictures lint slow soak bench hard report colcon users-versions clean
+.PHONY: help run test pictures gallery lint slow soak bench hard report colcon users-versions clean
 help: ## list of all targets
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
@@ -49,6 +49,9 @@ chromium:
 
 pictures: $(COMPLETE) $(COMPILED) chromium ## draw the pictures of the page, into docs/
 	@$(BIN)/python docs/viewer.py docs
+
+gallery: $(COMPLETE) $(COMPILED) chromium ## draw the cards of the shipped scenes, measure their ticks
+	@$(BIN)/python docs/gallery.py
 
 lint: $(COMPLETE) ## ruff, and mypy on the public names
 	@$(BIN)/python -m ruff check .

@@ -70,7 +70,8 @@ setup(
     maintainer_email='maintainers@users.noreply.github.com',
     python_requires='>=3.10',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed'], f'{NAME}.viewer.browser': ['*.js', '*.css']},
+    package_data={NAME: ['py.typed'], f'{NAME}.viewer.browser': ['*.js', '*.css'],
+                  f'{NAME}.viewer.gallery': ['*.json', '*.webp']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

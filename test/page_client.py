@@ -61,8 +61,12 @@ class PageClient:
 
     def steer(self, page, text):
         """Use the transport bar: a word of transport.js, and a number if it needs one."""
+        self.tell(page.transport.events, text)
+
+    def tell(self, events, text):
+        """Send an event of a script; see client_events.js."""
         self._events += 1
-        self.update(page.transport.events, f'{self._events} {text}')
+        self.update(events, f'{self._events} {text}')
 
     def press(self, page, label):
         """Press the hotkey of a page's command."""

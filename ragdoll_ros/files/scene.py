@@ -105,7 +105,8 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
             parts[key] = try_build(found, key, part, **data[key])
     if found:
         return None, found
-    plain = {key: data[key] for key in ('gravity', 'step', 'pace', 'self_collision') if key in data}
+    plain = {key: data[key] for key in ('gravity', 'step', 'pace', 'self_collision', 'description')
+             if key in data}
     scene = try_build(found, '', Scene, data.get('name', path.stem), tuple(placements),
                       **parts, **plain)
     return scene, found
@@ -121,6 +122,8 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
         'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
         'pace': scene.pace, 'self_collision': scene.self_collision,
         'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
+    if scene.description:
+        data['description'] = scene.description
     if scene.ground is not None:
         data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
     for placement in scene.dolls:

@@ -140,6 +140,7 @@ class Scene:
         step: one tick, s, 0.0002 to 0.2.
         pace: real-time factor that the node starts with.
         self_collision: whether the bones of a doll collide with each other.
+        description: a sentence on it.
 
     Raises:
         WrongForm, OutOfRange, NotPositive, NotFinite, DuplicateName: for its fields.
@@ -157,6 +158,7 @@ class Scene:
     step: float = 0.01
     pace: float = 1.0
     self_collision: bool = True
+    description: str = ''
 
     def __post_init__(self) -> None:
         set_fields(self, dolls=tuple(self.dolls), gravity=finite_floats('gravity', self.gravity))

@@ -12,7 +12,8 @@ from ..physics.engine.registry import ENGINES
 from .pushing.push_keys import PushKeys
 from .sources.source import Source, SourceStatus
 
-FIRST_SCENES = {'Doll': 'drop', 'Person': 'man_faints', 'Hair': 'ponytail', 'Crowd': 'crowd'}
+FIRST_SCENES = {'Doll': 'drop', 'Person': 'man_faints', 'Skin': 'character_falls',
+                'Hair': 'ponytail', 'Crowd': 'crowd'}
 """Scenes to begin with, one click away, by the labels of their buttons."""
 
 OTHER = '(other)'
@@ -24,6 +25,8 @@ class Controls:
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self.source = source
+        self.loading = ''
+        """Name of the scene that is being loaded; empty if none is."""
         self._shown_engine = ''
         self._shown_scene = OTHER
         self._loop = server.get_event_loop()
@@ -33,7 +36,7 @@ class Controls:
                                       visible=is_simulated)
         self.first_scenes = gui.add_button_group(
             'Try', tuple(FIRST_SCENES), visible=is_simulated, hint='the default doll, a man who '
-            'faints, a doll with hair, ten dolls')
+            'faints, a character with a skin, a doll with hair, ten dolls; more: the tab Scenes')
         self.engine = gui.add_dropdown('Engine', ENGINES, initial_value=ENGINES[0],
                                        visible=is_simulated,
                                        hint='physics engine; another one restarts the scene')
@@ -56,18 +59,26 @@ class Controls:
         self._shown_scene = shown = name if name in self.scene.options else OTHER
         self._loop.call_soon_threadsafe(setattr, self.scene, 'value', shown)
 
+    def load(self, client: viser.ClientHandle | None, name: str) -> None:
+        """Load a scene for a page; to be called in viser's thread."""
+        def load() -> None:
+            self.loading = name
+            try:
+                self.source.load(name)
+            finally:
+                self.loading = ''
+
+        self._try(client, load, lambda: self.show_scene(self._shown_scene))
+
     async def _on_scene(self, event: viser.GuiEvent) -> None:
         """Load the chosen scene, whose name is read before the page can overwrite it."""
         name = event.target.value
         if name != OTHER:
-            self._try(event.client, lambda: self.source.load(name),
-                      lambda: self.show_scene(self._shown_scene))
+            self.load(event.client, name)
 
     async def _on_first_scene(self, event: viser.GuiEvent) -> None:
         """Load the scene of a button."""
-        name = FIRST_SCENES[event.target.value]
-        self._try(event.client, lambda: self.source.load(name),
-                  lambda: self.show_scene(self._shown_scene))
+        self.load(event.client, FIRST_SCENES[event.target.value])
 
     async def _on_engine(self, event: viser.GuiEvent) -> None:
         """Set the chosen engine; see _on_scene."""

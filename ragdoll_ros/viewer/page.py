@@ -18,6 +18,7 @@ from .drawing.stage import Stage, configure_lights
 from .editor.banner import Banner
 from .editor.editor import Editor
 from .editor.handles.body_handles import ROOT
+from .gallery.gallery import Gallery
 from .pointer import Pointer
 from .pushing.hover import Hover
 from .pushing.motion import doll_mean
@@ -86,9 +87,14 @@ class Page:
             self.settings = SettingsPanel(server, source)
             self.display.on_home(lambda client: self.cameras.go_home(client))
             self._recording = RecordingPanel(server, lambda: self.timeline.clip)
+        self.gallery: Gallery | None = None
+        if is_simulated:
+            with self.tabs.add_tab('Scenes'):
+                self.gallery = Gallery(server, self.controls.load)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
+        self.transport.loading = lambda: self.controls.loading
         self.cameras = Cameras(server)
         self._auto_follow = AutoFollow(self.display.follow)
         self._hover = Hover(server)
@@ -127,6 +133,8 @@ class Page:
                 self.stage.set_dark(self.display.dark.value)
             if self.editor is not None:
                 self.editor.update_paused(status.paused, was_editing)
+            if self.gallery is not None:
+                self.gallery.show(self._live and self._live.scene, self.controls.loading, status)
             self._show_messages(status.problem, status.note)
             self.controls.show(status)
         if self.start_when_visible is not None:
@@ -151,7 +159,7 @@ class Page:
                 self.cameras.show(frame)
                 self._follow_if_it_leaves(frame)
         bone = self.controls.pushes.bone
-        self.transport.update(self.server.get_clients(), live, frame, status, now)
+        self.transport.update(live, frame, status, now)
         self.cameras.follow(frame, bone, now, self.display.follow.value)
         self._hover.show(frame, self.controls.pushes.motion, now)
         self.settings.show(status, live.scene, now)

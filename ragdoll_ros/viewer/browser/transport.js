@@ -37,7 +37,7 @@ function listen(send) {
   const reset = find('[data-do=reset]'), time = find('.time input'), speed = find('select');
   const range = find('[type=range]'), strip = find('.track span'), live = find('.live');
   const badge = find('.badge'), notice = find('.notice');
-  let byPointer = false, hiding = null, received = 0, last = '';
+  let byPointer = false, hiding = null, received = 0, last = '', loading = '';
 
   const put = (element, key, value) => { if (element[key] !== value) element[key] = value; };
   // The server tells the time twice a second; between, it goes on here.
@@ -72,6 +72,12 @@ function listen(send) {
     if (speed.length !== speeds.length || ![...speed].some((x) => +x.value === state.speed))
       speed.replaceChildren(...speeds.map((x) => new Option(`${+x.toPrecision(3)}×`, x)));
     put(speed, 'value', String(state.speed));
+    bar.classList.toggle('loading', !!state.loading);
+    if (state.loading !== loading) {
+      loading = state.loading;
+      put(notice, 'hidden', !loading);
+      if (loading) put(notice, 'textContent', `Loading ${loading} …`);
+    }
     put(live, 'hidden', state.recorded);
     live.setAttribute('aria-pressed', state.live);
     put(badge, 'hidden', state.live && !state.recorded);

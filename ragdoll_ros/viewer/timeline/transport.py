@@ -37,6 +37,8 @@ class Shown:
     playing: bool
     resting: bool
     """Whether a fall is over."""
+    loading: str
+    """Name of the scene that is being loaded; empty if none is."""
     time: float
     """Simulated time of the shown frame, s."""
     position: float
@@ -54,9 +56,11 @@ class Transport:
     """The bar of all pages, its keys, and what they do."""
 
     def __init__(self, server: viser.ViserServer, source: Source, timeline: Timeline) -> None:
-        self._source, self._timeline = source, timeline
+        self._server, self._source, self._timeline = server, source, timeline
         self.before_step: Callable[[], None] = lambda: None
         """Called before a single tick is requested."""
+        self.loading: Callable[[], str] = lambda: ''
+        """Name of the scene that is being loaded; empty if none is."""
         self.shown: Shown | None = None
         """None before the first frame."""
         self._sent: dict[int, dict[str, object]] = {}
@@ -111,14 +115,14 @@ class Transport:
         if client is not None:
             run_script(client, f'window.ragdollNotice?.({json.dumps(IN_THE_PAST)});')
 
-    def update(self, clients: dict[int, viser.ClientHandle], live: Frame, shown: Frame,
-               status: SourceStatus, now: float) -> None:
+    def update(self, live: Frame, shown: Frame, status: SourceStatus, now: float) -> None:
         """Show the newest and the shown frame's time, at ``now`` s of a steady clock."""
         timeline, before = self._timeline, self.shown
         playing = not status.paused if timeline.is_live else timeline.is_playing
         changes = {'live': timeline.is_live, 'recorded': self._source.recording is not None,
                    'playing': playing, 'speed': timeline.speed or status.real_time_factor,
-                   'resting': self._rest.update(live, status.paused, now)}
+                   'resting': self._rest.update(live, status.paused, now),
+                   'loading': self.loading()}
         is_due = now >= self._updated + PERIOD
         is_other = before is None or before.live != timeline.is_live
         if is_other or is_due or not playing:
@@ -130,7 +134,7 @@ class Transport:
         if is_due:
             self._updated = now
         self.shown = Shown(**changes) if before is None else replace(before, **changes)
-        self._send(clients)
+        self._send()
 
     def _rate(self, shown: Frame, speed: float, now: float) -> float:
         """How fast time has advanced since the last update; ``speed`` where it jumped."""
@@ -139,10 +143,10 @@ class Transport:
         rate = advanced / max(now - self._updated, 1e-9)
         return round(rate, 3) if 0 < rate < speed else speed
 
-    def _send(self, clients: dict[int, viser.ClientHandle]) -> None:
+    def _send(self) -> None:
         """Send to each page what it does not show yet."""
         values = asdict(self.shown)
-        for page, client in clients.items():
+        for page, client in self._server.get_clients().items():
             sent = self._sent.setdefault(page, {})
             changes = {key: value for key, value in values.items() if sent.get(key) != value}
             if changes:

@@ -1,0 +1,1 @@
+"""The shipped scenes as cards: picture, sentence and cost on this machine."""
