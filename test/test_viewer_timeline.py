@@ -252,6 +252,22 @@ def test_nothing_is_taken_hold_of_in_the_past_and_a_reset_leads_back():
         wait(lambda: page.timeline.is_live)
 
 
+def test_a_typed_time_is_that_of_the_shown_run():
+    """Digit by digit, after a reset: neither another run's frame nor one that has gone."""
+    with served(SimulationSource(DROP)) as page:
+        client = page.open()
+        wait(lambda: page.frame and page.frame.time > 0.5)
+        client.press(page, 'Reset')
+        wait(lambda: page.timeline.clip.resets.any() and page.frame.time > 0.5)
+        run = page.frame.run
+        for text, instant in (('0', 0.0), ('0.', 0.0), ('0.2', 0.2), ('0.25', 0.25), ('-1', 0.0)):
+            client.steer(page, f'time {text}')
+            wait(lambda instant=instant: page.frame.time == pytest.approx(instant, abs=1e-9))
+            assert page.frame.run == run and not page.timeline.is_live
+        client.steer(page, 'time 99')
+        wait(lambda: page.frame is page.timeline.clip.frame(len(page.timeline.clip.times) - 1))
+
+
 def test_plots_follow_the_timeline():
     """They end where one looks, and begin anew with a reset."""
     with served(SimulationSource(DROP)) as page:

@@ -134,7 +134,7 @@ class Page:
             if self.editor is not None:
                 self.editor.update_paused(status.paused, was_editing)
             if self.gallery is not None:
-                self.gallery.show(self._live and self._live.scene, self.controls.loading, status)
+                self.gallery.show(self._live and self._live.scene, self.controls.loading)
             self._show_messages(status.problem, status.note)
             self.controls.show(status)
         if self.start_when_visible is not None:

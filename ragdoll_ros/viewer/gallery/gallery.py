@@ -12,11 +12,7 @@ import viser
 from ...files import config, yaml_text
 from ...model.scene import Scene
 from ..browser.scripts import add_listener, style
-from ..sources.source import SourceStatus
 from .cost import FOLDER, cost_text, estimated_cost, reference_cost
-
-ENGINE, ACCURACY = 'rigid', 'normal'
-"""To which the costs belong."""
 
 SEEN = 'seen'
 """Event of gallery.js: the cards are looked at."""
@@ -45,22 +41,16 @@ class Gallery:
         self._entries = {path.stem: entry(path.stem) for path in sorted(FOLDER.glob('*.webp'))}
         self._reference = 0.0
         """As `reference_cost` has found it here, ms; 0 before."""
-        self._measured: dict[str, float] = {}
-        """Largest cost of a tick of each scene that has run, ms."""
         self._is_measuring = False
         self._shown: tuple = ()
         gui.add_html(style('gallery.css'))
         self.events = add_listener(gui, 'gallery', 'gallery.js', self._take)
         self.cards = {name: gui.add_html(self._card(name, '', '')) for name in self._entries}
 
-    def show(self, current: Scene | None, loading: str, status: SourceStatus) -> None:
-        """Show which scene runs and which one is being loaded, with their costs."""
+    def show(self, current: Scene | None, loading: str) -> None:
+        """Show which scene runs, which one is being loaded, and what all cost."""
         name = '' if current is None else current.name
-        if (name in self._entries and (status.engine_name, status.accuracy) == (ENGINE, ACCURACY)
-                and status.tick_cost > 0):
-            cost = float(f'{1e3 * status.tick_cost:.1g}')
-            self._measured[name] = max(self._measured.get(name, 0.0), cost)
-        shown = name, loading, self._reference, self._measured.get(name)
+        shown = name, loading, self._reference
         if shown == self._shown:
             return
         self._shown = shown
@@ -72,13 +62,10 @@ class Gallery:
     def _card(self, name: str, current: str, loading: str) -> str:
         """HTML of a card."""
         scene, text, is_slow = self._entries[name], '', False
-        cost = self._measured.get(name, 0.0)
-        if self._reference:
-            cost = max(cost, estimated_cost(name, self._reference))
         if name == loading:
             text = 'Loading …'
-        elif cost:
-            text, is_slow = cost_text(cost, scene.step, scene.pace)
+        elif self._reference:
+            text, is_slow = cost_text(estimated_cost(name, self._reference), scene.step, scene.pace)
         state = 'aria-busy="true"' if name == loading else (
             'aria-current="true"' if name == current else '')
         return CARD.format(name=html.escape(name), state=state, picture=scene.picture,

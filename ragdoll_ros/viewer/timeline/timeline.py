@@ -4,6 +4,8 @@ from __future__ import annotations
 import threading
 import time
 
+import numpy as np
+
 from ..sources.source import Frame, Source
 from .frame_buffer import Clip, FrameBuffer, clip_of
 from .playhead import Playhead
@@ -114,8 +116,12 @@ class Timeline:
                 return
             clip = playhead.clip
             index = clip.index(playhead.time(time.monotonic()))
-            shown = float(clip.times[index] - clip.times[0])
-            self.go_to(shown + max(simulated, 0.0) - clip.frame(index).time)
+            starts = np.flatnonzero(clip.resets)
+            first = max((int(start) for start in starts if start <= index), default=0)
+            end = min((int(start) for start in starts if start > index), default=len(clip.times))
+            times = [clip.frame(k).time for k in range(first, end)]
+            found = first + max(int(np.searchsorted(times, simulated + 5e-10, 'right')) - 1, 0)
+            self.go_to(float(clip.times[found] - clip.times[0]))
 
     def go_live(self) -> None:
         """Show the newest frame."""
