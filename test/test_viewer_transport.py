@@ -130,12 +130,12 @@ def test_a_second_page_shows_the_same(browser, page, view):
     view.key(' ')
     view.wait(lambda: page.source.status.paused)
     view.key(',')
-    view.page.get_by_label('Speed').select_option('0.1')
+    view.page.get_by_label('Speed', exact=True).select_option('0.1')
     view.wait(lambda: page.timeline.speed == 0.1)
     view.wait(lambda: looking_back(view))
     other = open_view(browser, page)
     other.wait(lambda: looking_back(other) and shown_time(other) == shown_time(view))
-    assert other.page.get_by_label('Speed').input_value() == '0.1'
+    assert other.page.get_by_label('Speed', exact=True).input_value() == '0.1'
     other.press('Live')
     view.wait(lambda: not looking_back(view))
     other.close()

@@ -54,6 +54,10 @@ function listen(send) {
     range.setAttribute('aria-valuetext', `${now} s`);
   };
   window.ragdollShow = (state) => {
+    if (state.speed === undefined) {  // what came before was not for this page
+      send('repeat');
+      return;
+    }
     const name = state.playing ? 'Pause' : 'Play';
     if (toggle.ariaLabel !== name) {
       toggle.ariaLabel = name;
@@ -90,7 +94,7 @@ function listen(send) {
     hiding = setTimeout(() => { notice.hidden = true; }, 4000);
   };
   if (window.ragdollTransport) window.ragdollShow(window.ragdollTransport);
-  setInterval(() => { if (window.ragdollTransport) showTime(); }, 50);
+  setInterval(() => { if (window.ragdollTransport?.speed !== undefined) showTime(); }, 50);
 
   bar.addEventListener('pointerdown', () => { byPointer = true; });
   bar.addEventListener('click', (event) => {

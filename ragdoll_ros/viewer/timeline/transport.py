@@ -159,6 +159,7 @@ class Transport:
         actions: dict[str, Callable[[], None]] = {
             'toggle': self.toggle, 'step': self._step_in_thread, 'back': self.step_back,
             'reset': self._source.reset, 'live': self._timeline.go_live,
+            'repeat': lambda: self._sent.pop(page, None),
             'focus': lambda: self._timeline.hold(page),
             'blur': lambda: self._timeline.release(page)}
         values: dict[str, Callable[[float], None]] = {

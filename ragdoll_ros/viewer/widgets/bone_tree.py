@@ -30,7 +30,7 @@ class BoneTree:
         """Show the bones of a doll, each below its parent; mark those that are ``selected``."""
         rows = [_row(scene.qualified(placement, bone), bone, depth, selected)
                 for bone, depth in depths(placement)]
-        content = ('<div class="ragdoll-tree" role="tree" aria-label="Bones" '
+        content = ('<div class="ragdoll-tree" role="tree" tabindex="0" aria-label="Bones" '
                    f'aria-multiselectable="true">{"".join(rows)}</div>'
                    + script('bone_tree_scroll.js'))
         if content != self._html.content:
