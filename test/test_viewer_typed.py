@@ -94,7 +94,7 @@ def meant(label, number):
 def said(view):
     """What is written in red."""
     return view.page.evaluate("""() => [...document.querySelectorAll('div')].filter(
-        each => each.style.color === 'rgb(201, 42, 42)' && each.checkVisibility())
+        each => each.style.color === 'var(--ragdoll-red)' && each.checkVisibility())
         .map(each => each.textContent)""")
 
 
