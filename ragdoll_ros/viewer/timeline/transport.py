@@ -5,6 +5,7 @@ import asyncio
 import json
 import math
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 
 import viser
@@ -67,6 +68,7 @@ class Transport:
         """What each page shows."""
         self._rest = Rest()
         self._updated = 0.0
+        self._worker = ThreadPoolExecutor(1, 'transport')
         gui = server.gui
         self.events = add_listener(gui, 'transport', 'transport.js', self._take,
                                    STYLE=script_source('transport.css'))
@@ -154,10 +156,14 @@ class Transport:
                 run_script(client, SHOW % json.dumps(changes))
 
     def _take(self, page: int, text: str) -> None:
-        """An event of transport.js: what is to be done, and a number if it needs one."""
+        """An event of transport.js; of viser's thread. Done in order in another, as steps wait."""
+        asyncio.get_running_loop().run_in_executor(self._worker, self._act, page, text)
+
+    def _act(self, page: int, text: str) -> None:
+        """Do what ``text`` names, with a number if it needs one."""
         action, _, number = text.partition(' ')
         actions: dict[str, Callable[[], None]] = {
-            'toggle': self.toggle, 'step': self._step_in_thread, 'back': self.step_back,
+            'toggle': self.toggle, 'step': self.step, 'back': self.step_back,
             'reset': self._source.reset, 'live': self._timeline.go_live,
             'repeat': lambda: self._sent.pop(page, None),
             'focus': lambda: self._timeline.hold(page),
@@ -174,7 +180,3 @@ class Transport:
                 return
             if math.isfinite(value):
                 values[action](value)
-
-    def _step_in_thread(self) -> None:
-        """Step in another thread, as `before_step` may wait; of viser's thread."""
-        asyncio.get_running_loop().run_in_executor(None, self.step)
