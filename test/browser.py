@@ -66,13 +66,14 @@ BODIES = """() => {
 }"""
 """Matrices that the graphics card gets of each instance, by batch, column by column; z up."""
 
-LOOK = """([eye, at]) => {
+LOOK = """async ([eye, at]) => {
   const {camera, cameraControl, nodeRefFromName: nodes} = window.__viserMutable;
   const [from, to] = [eye, at].map(
     point => camera.position.clone().set(...point).applyMatrix4(nodes[''].matrixWorld));
   cameraControl.setLookAt(...from, ...to, false);
+  for (let frame = 0; frame < 2; frame++) await new Promise(requestAnimationFrame);
 }"""
-"""Places a page's camera, m, z up."""
+"""Places a page's camera, m, z up, and waits until a picture is drawn from there."""
 
 TO_PIXELS = """points => {
   const {camera, canvas, nodeRefFromName: nodes} = window.__viserMutable;

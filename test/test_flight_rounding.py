@@ -39,7 +39,7 @@ def most_steps(bodies):
     """Bound on the steps of a tick: two budgets of flight, of which the last step may be tried 30
     times, and contact steps.
     """
-    return 2 * max(100, 4500 // bodies) + 2 * 30 + MOST_CONTACT_STEPS
+    return 2 * max(100, 7000 // bodies) + 2 * 30 + MOST_CONTACT_STEPS
 
 
 def chain(count, masses, spacing=0.1):

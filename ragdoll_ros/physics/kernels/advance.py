@@ -56,7 +56,7 @@ from .workspace import WORKSPACE, Workspace
 LONGEST_FLIGHT = 0.05
 """s: the longest step of flight that is tried."""
 
-FLIGHT_WORK, MIN_FLIGHT_STEPS = 4500, 100
+FLIGHT_WORK, MIN_FLIGHT_STEPS = 7000, 100
 """Steps of flight that may be tried in one tick, or in its part between two changes of the pushes,
 times the number of bodies, and their least number. Then, which is counted, as many more may with
 the tolerance times CUT_TOLERANCE, and after those contact steps, of which there are never many."""
