@@ -159,7 +159,7 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         coupled=np.zeros(max(rows, 8), np.int64),
         phi=np.zeros((contacts, 5)), local=np.zeros(5), lu=make_sparse_lu(nv, contacts, wide),
         occurrence_start=np.zeros(nv + 1, np.int64),
-        occurrences=np.zeros(contacts * wide, np.int64))
+        occurrences=np.zeros((contacts * wide, 2), np.int64))
 
 
 WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

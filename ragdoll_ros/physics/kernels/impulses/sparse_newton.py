@@ -104,10 +104,9 @@ def connect_bodies(s: System, ws: Workspace, m: int) -> int:
 @compiled
 def list_occurrences(island: Island, dofs: int, m: int) -> None:
     """Write to island.occurrences the members whose support has each degree of freedom, and where,
-    as flat indices of lu.sets, by places.
+    as indices of lu.sets, by places.
     """
-    begin, listed, sets, wide = (island.occurrence_start, island.occurrences, island.lu.sets,
-                                 island.lu.sets.shape[1])
+    begin, listed, sets = island.occurrence_start, island.occurrences, island.lu.sets
     for i in range(dofs + 1):
         begin[i] = 0
     for k in range(m):
@@ -118,7 +117,7 @@ def list_occurrences(island: Island, dofs: int, m: int) -> None:
     for k in range(m):
         for x in range(island.lu.sizes[k]):
             i = sets[k, x]
-            listed[begin[i]] = k * wide + x
+            listed[begin[i], 0], listed[begin[i], 1] = k, x
             begin[i] += 1
     for i in range(dofs, 0, -1):
         begin[i] = begin[i - 1]
@@ -247,25 +246,39 @@ def solve_for_z(island: Island, dofs: int) -> bool:
     """Solve for dz, into island.z_direction, by places, after multiply_rows() of all members.
     Returns whether the matrix is regular.
     """
-    lu, Y, BY, dz, wide = (island.lu, island.Y, island.BY, island.z_direction,
-                           island.lu.sets.shape[1])
+    lu, Y, dz = island.lu, island.Y, island.z_direction
     for i in range(dofs):
         clear_row(lu, i)
         lu.row[i], dz[i] = 1.0, 0.0
         for at in range(island.occurrence_start[i], island.occurrence_start[i + 1]):
-            k, x = island.occurrences[at] // wide, island.occurrences[at] % wide
+            k, x = island.occurrences[at, 0], island.occurrences[at, 1]
             member, phi = island.members[k], island.phi[k]
             for e in range(member.kind):
-                entry = Y[member.row + e, x]
-                if entry != 0.0:
-                    dz[i] -= entry * phi[e]
-                if entry != 0.0 and island.coupled[member.row + e]:
-                    for y in range(lu.sizes[k]):
-                        lu.row[lu.sets[k, y]] += entry * BY[member.row + e, y]
+                dz[i] -= Y[member.row + e, x] * phi[e]
+            add_contact_row(island, k, x)
         if not eliminate_row(lu, i, dz):
             return False
     substitute_back(lu, dofs, dz)
     return True
+
+
+@compiled
+def add_contact_row(island: Island, k: int, x: int) -> None:
+    """Add to lu.row what member k contributes to the row of its degree of freedom x."""
+    member, Y, BY, place, row = island.members[k], island.Y, island.BY, island.lu.sets, (
+        island.lu.row)
+    a, coupled, alone = member.row, island.coupled, 0
+    if member.kind >= 3:  # three at once: an indirect address costs as much as their sum
+        alone = 3
+        if coupled[a] or coupled[a + 1] or coupled[a + 2]:
+            f, g, h = Y[a, x], Y[a + 1, x], Y[a + 2, x]
+            for y in range(island.lu.sizes[k]):
+                row[place[k, y]] += f * BY[a, y] + g * BY[a + 1, y] + h * BY[a + 2, y]
+    for e in range(alone, member.kind):
+        if coupled[a + e]:
+            f = Y[a + e, x]
+            for y in range(island.lu.sizes[k]):
+                row[place[k, y]] += f * BY[a + e, y]
 
 
 @compiled

@@ -23,8 +23,8 @@ SparseLU = collections.namedtuple(
     'SparseLU', 'sets sizes start columns values inverse above_start above mark row set_head '
     'set_next child sibling')
 """A sparse factor. ``sets`` (m, k), of which ``sizes`` (m,) count: the cliques. Row i of U has
-``columns`` and ``values`` from start[i] to start[i + 1], and the reciprocal of its pivot in
-``inverse``; the rows ``above`` that have an entry in column i are those from above_start[i] to
+``columns``, ascending, and ``values`` from start[i] to start[i + 1], and the reciprocal of its pivot
+in ``inverse``; the rows ``above`` that have an entry in column i are those from above_start[i] to
 above_start[i + 1], in order. ``row`` (n,): the row that is eliminated. The others are lists:
 cliques by their first index, children by their parent in the elimination tree."""
 
@@ -79,11 +79,22 @@ def find_pattern(lu: SparseLU, n: int, m: int) -> int:
                     parent = min(parent, j)
             k = lu.sibling[k]
         start[i + 1] = total
+        sort_columns(columns, start[i], total)
         work += (total - start[i]) ** 2
         if parent < n:
             lu.sibling[i], lu.child[parent] = lu.child[parent], i
     transpose_pattern(lu, n)
     return work
+
+
+@compiled
+def sort_columns(columns: np.ndarray, begin: int, end: int) -> None:
+    """Sort the entries from ``begin`` to ``end`` in place."""
+    for e in range(begin + 1, end):
+        own, k = columns[e], e
+        while k > begin and columns[k - 1] > own:
+            columns[k], k = columns[k - 1], k - 1
+        columns[k] = own
 
 
 @compiled
@@ -120,14 +131,25 @@ def eliminate_row(lu: SparseLU, i: int, b: np.ndarray) -> bool:
     """Eliminate row i, of which lu.row has the entries of A, and its right-hand side b[i], by the
     rows before it. Returns whether its pivot is regular.
     """
-    row, columns, values = lu.row, lu.columns, lu.values
-    for e in range(lu.above_start[i], lu.above_start[i + 1]):
+    row, columns, values, start = lu.row, lu.columns, lu.values, lu.start
+    e, end = lu.above_start[i], lu.above_start[i + 1]
+    while e < end:
         k = lu.above[e]
-        f = row[k] * lu.inverse[k]
-        if f != 0.0:
-            for g in range(lu.start[k], lu.start[k + 1]):
+        f, first, e = row[k] * lu.inverse[k], start[k], e + 1
+        b[i] -= f * b[k]
+        count = start[k + 1] - first
+        if e < end and lu.above[e] == k + 1 and columns[first] == k + 1 and (
+                start[k + 2] - start[k + 1] == count - 1):
+            # Rows of one body have one pattern: two at once, as addresses are indirect.
+            row[k + 1] -= f * values[first]
+            h, next_first, e = row[k + 1] * lu.inverse[k + 1], start[k + 1], e + 1
+            b[i] -= h * b[k + 1]
+            for g in range(count - 1):
+                row[columns[next_first + g]] -= (
+                    f * values[first + 1 + g] + h * values[next_first + g])
+        else:
+            for g in range(first, first + count):
                 row[columns[g]] -= f * values[g]
-            b[i] -= f * b[k]
     if not 1e-300 < abs(row[i]) < math.inf:
         return False
     lu.inverse[i] = 1 / row[i]
