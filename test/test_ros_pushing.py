@@ -178,7 +178,7 @@ def test_a_click_chooses_what_is_pushed_and_the_pointer_tells_its_name(view, pag
     head = START[SCENE.bone_index('head')]
     view.page.mouse.click(*view.pixels([head])[0])
     view.wait(lambda: page.source.pushed_bone == 'head')
-    view.see('pushes head')
+    view.see('Pushes head')
     view.page.mouse.move(*(view.pixels([head])[0] + 1))
     view.wait(lambda: hovered(page) == 'head 0.0 m/s')
     view.key('ArrowUp')

@@ -280,7 +280,7 @@ def edited():
 
 def saved(view, folder, name):
     """What the page saves under a name."""
-    view.field('file').fill(name)
+    view.field('File').fill(name)
     view.press('Save')
     view.see(f'saved {name}.yaml')
     return load_scene(str(folder / f'{name}.yaml'))
@@ -290,8 +290,8 @@ def choose(view, name):
     """Choose a bone by a click on it, where it stands at the start; its numbers are shown then."""
     index = SCENE.bone_index(name)
     view.page.mouse.click(*view.pixels(START[index:index + 1])[0])
-    view.wait(lambda: view.field('bone').input_value() == name
-              and float(view.field('mass, kg').input_value()) == SCENE.bones[index].mass)
+    view.wait(lambda: view.field('Bone').input_value() == name
+              and float(view.field('Mass, kg').input_value()) == SCENE.bones[index].mass)
 
 
 def test_a_body_and_its_joint_are_edited_saved_undone_and_loaded(view, folder):
@@ -299,21 +299,21 @@ def test_a_body_and_its_joint_are_edited_saved_undone_and_loaded(view, folder):
     view.hold_at(SCENE, START)
     view.tab('Edit')
     choose(view, 'left_upper_arm')
-    view.field('mass, kg').fill('-1')
+    view.field('Mass, kg').fill('-1')
     view.press('Update')
     view.see('mass must be above 0 kg, not -1')
-    assert (view.top(view.field('mass, kg')) < view.top(view.page.get_by_text('mass must be'))
-            < view.top(view.field('position, m')))
+    assert (view.top(view.field('Mass, kg')) < view.top(view.page.get_by_text('mass must be'))
+            < view.top(view.field('Position, m')))
     assert saved(view, folder, 'untouched') == SCENE
-    view.field('mass, kg').fill('7.5')
-    view.field('limits 1, °').fill('-90, 30')
+    view.field('Mass, kg').fill('7.5')
+    view.field('Limits 1, °').fill('-90, 30')
     view.press('Update')
     view.see('Undo: numbers of left_upper_arm')
     assert saved(view, folder, 'edited') == edited()
     view.key('Control+z')
     view.see('Redo: numbers of left_upper_arm')
     assert saved(view, folder, 'undone') == SCENE
-    view.field('file').fill('edited')
+    view.field('File').fill('edited')
     view.press('Load')
     view.see('loaded edited')
     assert saved(view, folder, 'loaded') == edited()
@@ -326,7 +326,7 @@ def test_a_colour_is_typed_or_refused(view, folder):
     view.hold_at(SCENE, START)
     view.tab('Edit')
     choose(view, 'head')
-    field, names, blue = view.field('colour'), map(str, itertools.count()), (30, 144, 255)
+    field, names, blue = view.field('Colour'), map(str, itertools.count()), (30, 144, 255)
 
     def color():
         scene = saved(view, folder, 'color_' + next(names))
@@ -419,7 +419,7 @@ def test_numbers_are_seen_whole(view):
     view.hold_at(SCENE, START)
     view.tab('Edit')
     choose(view, 'right_shin')
-    view.field('position, m').fill('-0.123457, -1.123456, -0.888888')
+    view.field('Position, m').fill('-0.123457, -1.123456, -0.888888')
     assert view.page.evaluate(CUT_OFF) == []
 
 

@@ -160,5 +160,5 @@ def test_a_click_in_a_browser_hits_one_doll_of_several(tmp_path):
         for name in ('doll_8/torso', 'doll_7/torso', 'doll_7/head'):
             index = crowd.bone_index(name)
             view.page.mouse.click(*view.pixels(start[index:index + 1])[0])
-            view.wait(lambda name=name: view.field('bone').input_value() == name
-                      and view.field('doll').input_value() == name.split('/')[0])
+            view.wait(lambda name=name: view.field('Bone').input_value() == name
+                      and view.field('Doll').input_value() == name.split('/')[0])

@@ -31,7 +31,7 @@ def view(tmp_path_factory):
 def saved(view):
     """The scene as the page saves it."""
     name = f'edited_{next(NUMBERS)}'
-    view.field('file').fill(name)
+    view.field('File').fill(name)
     view.press('Save')
     view.see(f'saved {name}.yaml')
     return load_scene(str(view.folder / f'{name}.yaml'))
@@ -41,8 +41,8 @@ def choose(view, name):
     """Choose a bone by a click on it, at the start."""
     index = SCENE.bone_index(name)
     view.page.mouse.click(*view.pixels(START[index:index + 1])[0])
-    view.wait(lambda: view.field('bone').input_value() == name
-              and float(view.field('mass, kg').input_value()) == SCENE.bones[index].mass)
+    view.wait(lambda: view.field('Bone').input_value() == name
+              and float(view.field('Mass, kg').input_value()) == SCENE.bones[index].mass)
 
 
 FOCUSED = """() => document.activeElement?.closest('.mantine-Flex-root')
@@ -59,10 +59,10 @@ def tab_to(view, label):
     raise AssertionError(label)
 
 
-TYPED = {'size, m': '0.08 0.08 0.4', 'mass, kg': '3.5', 'inertia, kg m²': '0.1 0.1 0.05',
-         'position, m': '0 0.1 0.31', 'rotation, °': '0 0 30', 'friction': '0.7',
-         'rolling, m': '0.01', 'restitution': '0.25', 'colour': 'rebeccapurple',
-         'anchor, m': '0 0.1 0.55', 'limits 1, °': '-5 100', 'damping': '0.5'}
+TYPED = {'Size, m': '0.08 0.08 0.4', 'Mass, kg': '3.5', 'Inertia, kg m²': '0.1 0.1 0.05',
+         'Position, m': '0 0.1 0.31', 'Rotation, °': '0 0 30', 'Friction': '0.7',
+         'Rolling, m': '0.01', 'Restitution': '0.25', 'Colour': 'rebeccapurple',
+         'Anchor, m': '0 0.1 0.55', 'Limits 1, °': '-5 100', 'Damping, N m s': '0.5'}
 """Twelve fields in the order of the form, each as it is typed."""
 
 
@@ -100,7 +100,7 @@ def test_a_refused_value_is_told_at_the_field_and_at_the_button(view):
     """The field keeps its text and the focus; the next Enter applies what is right."""
     view.tab('Edit')
     choose(view, BONE)
-    field = view.field('friction')
+    field = view.field('Friction')
     field.focus()
     field.fill('-1')
     view.key('Enter')
@@ -108,7 +108,7 @@ def test_a_refused_value_is_told_at_the_field_and_at_the_button(view):
     told = view.page.get_by_text('Nothing is applied: see friction')
     told.wait_for()
     assert 0 < view.top(told) - view.top(view.button('Update')) < 60
-    assert field.input_value() == '-1' and view.page.evaluate(FOCUSED) == 'friction'
+    assert field.input_value() == '-1' and view.page.evaluate(FOCUSED) == 'Friction'
     field.fill('0.5')
     view.key('Enter')
     told.wait_for(state='hidden')
@@ -121,7 +121,7 @@ def test_what_is_typed_while_a_value_is_applied_stays(view):
     """The scene restarts meanwhile, and the form is filled anew."""
     view.tab('Edit')
     choose(view, BONE)
-    mass, friction = view.field('mass, kg'), view.field('friction')
+    mass, friction = view.field('Mass, kg'), view.field('Friction')
     friction.fill('0.7')
     mass.fill('4')
     mass.press('Enter')
@@ -176,9 +176,9 @@ def test_keys_mean_no_two_things(view):
     view.key('w')
     view.wait(lambda: mode(view) == 'Move')
     choose(view, BONE)
-    view.field('mass, kg').fill('')
+    view.field('Mass, kg').fill('')
     view.page.keyboard.type('5e0')
-    assert view.field('mass, kg').input_value() == '5e0'
+    assert view.field('Mass, kg').input_value() == '5e0'
     view.page.mouse.click(20, 700)
     view.tab('Play')
     view.page.mouse.click(20, 700)
@@ -210,7 +210,7 @@ def test_bones_are_chosen_in_the_tree_and_in_the_picture(view):
     """With Ctrl several, whose masses are changed and undone as one step; a child is indented."""
     view.tab('Edit')
     row(view, 'torso').click()
-    view.wait(lambda: selected(view) == {'torso'} and view.field('bone').input_value() == 'torso')
+    view.wait(lambda: selected(view) == {'torso'} and view.field('Bone').input_value() == 'torso')
     left = [row(view, name).evaluate('row => parseFloat(getComputedStyle(row).paddingLeft)')
             for name in ('torso', 'left_thigh', 'left_shin')]
     assert left == sorted(set(left))
@@ -222,7 +222,7 @@ def test_bones_are_chosen_in_the_tree_and_in_the_picture(view):
     names = {'torso', 'left_shin', 'head'}
     view.wait(lambda: selected(view) == names)
     view.see('3 bones are selected')
-    field = view.field('mass, kg')
+    field = view.field('Mass, kg')
     assert field.input_value() == '(several)'
     field.fill('6.5')
     field.press('Enter')

@@ -28,21 +28,21 @@ TYPED = {
 """And what each says, if it says anything."""
 
 FIELDS = {
-    'mass, kg': lambda bone, joint: bone.mass,
-    'friction': lambda bone, joint: bone.friction,
-    'rolling, m': lambda bone, joint: bone.rolling_friction,
-    'restitution': lambda bone, joint: bone.restitution,
-    'damping': lambda bone, joint: joint.damping,
-    'size, m': lambda bone, joint: bone.shape.size,
-    'position, m': lambda bone, joint: bone.position,
-    'anchor, m': lambda bone, joint: joint.anchor,
-    'inertia, kg m²': lambda bone, joint: bone.moments,
-    'limits 1, °': lambda bone, joint: joint.limits[0]}
+    'Mass, kg': lambda bone, joint: bone.mass,
+    'Friction': lambda bone, joint: bone.friction,
+    'Rolling, m': lambda bone, joint: bone.rolling_friction,
+    'Restitution': lambda bone, joint: bone.restitution,
+    'Damping, N m s': lambda bone, joint: joint.damping,
+    'Size, m': lambda bone, joint: bone.shape.size,
+    'Position, m': lambda bone, joint: bone.position,
+    'Anchor, m': lambda bone, joint: joint.anchor,
+    'Inertia, kg m²': lambda bone, joint: bone.moments,
+    'Limits 1, °': lambda bone, joint: joint.limits[0]}
 
-OF_THREE = ('size, m', 'position, m', 'anchor, m', 'inertia, kg m²')
+OF_THREE = ('Size, m', 'Position, m', 'Anchor, m', 'Inertia, kg m²')
 """Fields of three numbers; each is typed with a semicolon between them."""
 
-OPTIONAL = ('friction', 'rolling, m', 'restitution', 'inertia, kg m²')
+OPTIONAL = ('Friction', 'Rolling, m', 'Restitution', 'Inertia, kg m²')
 """Fields in which nothing means something."""
 
 
@@ -68,15 +68,15 @@ def view(tmp_path_factory):
           opened(context, url, SCENE, {'width': 1280, 'height': 800}, first=True) as view):
         view.folder = folder
         view.tab('Edit')
-        view.row('bone').locator('input').first.click()
+        view.row('Bone').locator('input').first.click()
         view.page.get_by_role('option', name=BONE, exact=True).click()
-        view.wait(lambda: view.field('mass, kg').input_value() == '5')
+        view.wait(lambda: view.field('Mass, kg').input_value() == '5')
         yield view
 
 
 def written(label, text):
     """What stands in a field that is to hold a number: alone, three times, or below itself."""
-    if label == 'limits 1, °':
+    if label == 'Limits 1, °':
         return f'-90; {text}'
     return ';'.join([text] * 3) if label in OF_THREE else text
 
@@ -85,7 +85,7 @@ def meant(label, number):
     """And what the scene has then."""
     if number is None:
         return None
-    if label == 'limits 1, °':
+    if label == 'Limits 1, °':
         # As precise as a conversion from degrees is.
         return pytest.approx(np.radians((-90, number)), rel=1e-15)
     return (number,) * 3 if label in OF_THREE else number
@@ -101,7 +101,7 @@ def said(view):
 def used(view, label):
     """What a field's number is in the scene, as the page saves it under another name each time."""
     name = f'typed_{next(COUNT)}'
-    view.field('file').fill(name)
+    view.field('File').fill(name)
     view.press('Save')
     view.see(f'saved {name}.yaml')
     scene = load_scene(str(view.folder / f'{name}.yaml'))
@@ -109,7 +109,7 @@ def used(view, label):
 
 
 @pytest.mark.parametrize(('label', 'every'), [
-    ('mass, kg', 7), *(pytest.param(label, 1, marks=pytest.mark.slow) for label in FIELDS)])
+    ('Mass, kg', 7), *(pytest.param(label, 1, marks=pytest.mark.slow) for label in FIELDS)])
 def test_what_is_typed_is_used_to_the_digit_or_refused_in_words(view, label, every):
     field, first, taken = view.field(label), view.field(label).input_value(), 0
     before = used(view, label)
@@ -146,9 +146,9 @@ def test_handles_stay_on_the_body_that_is_edited(view, edits):
     random = np.random.default_rng(3)
     if view.button('Edit').count():
         view.press('Edit')
-    choices = {'size, m': ['19 19 19', '.3 .3 .3', '0.08 0.08 0.2'],
-               'position, m': ['0 0 0', '0 0.1 0.5', '0 3 9'], 'rotation, °': ['0 0 0', '10 20 30']}
-    labels = ['size, m', 'size, m', *random.choice(list(choices), edits)][:edits]
+    choices = {'Size, m': ['19 19 19', '.3 .3 .3', '0.08 0.08 0.2'],
+               'Position, m': ['0 0 0', '0 0.1 0.5', '0 3 9'], 'Rotation, °': ['0 0 0', '10 20 30']}
+    labels = ['Size, m', 'Size, m', *random.choice(list(choices), edits)][:edits]
     for count, label in enumerate(labels):
         text = choices[label][count] if count < 2 else random.choice(choices[label])
         view.field(label).fill(text)

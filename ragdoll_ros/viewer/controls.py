@@ -35,11 +35,11 @@ class Controls:
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
         self.first_scenes = gui.add_button_group(
-            'Try', tuple(FIRST_SCENES), visible=is_simulated, hint='the default doll, a man who '
+            'Try', tuple(FIRST_SCENES), visible=is_simulated, hint='The default doll, a man who '
             'faints, a character with a skin, a doll with hair, ten dolls; more: the tab Scenes')
         self.engine = gui.add_dropdown('Engine', ENGINES, initial_value=ENGINES[0],
                                        visible=is_simulated,
-                                       hint='physics engine; another one restarts the scene')
+                                       hint='Physics engine; another one restarts the scene')
         self.scene.on_update(self._on_scene)
         self.first_scenes.on_click(self._on_first_scene)
         self.engine.on_update(self._on_engine)

@@ -47,8 +47,8 @@ class RecordingPanel:
                 hint='Poses of all bones as run.mcap; play it by ragdoll_viewer --play run.mcap'
                 if CAN_WRITE else 'Requires mcap: pip install mcap')
             screenshot = server.gui.add_button('Screenshot', icon=viser.Icon.CAMERA,
-                                               hint='this view as ragdoll.png')
-            export = server.gui.add_button('Export', icon=viser.Icon.DOWNLOAD, hint='the whole '
+                                               hint='This view as ragdoll.png')
+            export = server.gui.add_button('Export', icon=viser.Icon.DOWNLOAD, hint='The whole '
                                            'timeline as run.zip: MCAP, glTF, BVH, CSV')
         self._frame: Frame | None = None
         export.on_click(self._send_export)

@@ -40,12 +40,12 @@ class SettingsPanel:
         self.health = HealthPanel(gui)
         with gui.add_folder('Settings', expand_by_default=False, visible=source.recording is None):
             self.accuracy = gui.add_dropdown('Accuracy', tuple(ACCURACIES), visible=False,
-                                             hint='step size; the simulation continues')
+                                             hint='Step size; the simulation continues')
             self.cost = gui.add_html('')
             self.form = Form(gui, FIELDS, lambda key, kind: None)
             self.ground = gui.add_checkbox('Ground', True)
             self.apply = gui.add_button('Apply and restart', icon='check', color='green',
-                                        hint='restart the scene with these settings')
+                                        hint='Restart the scene with these settings')
             self.message = gui.add_html('')
         self.accuracy.on_update(self._on_accuracy)
         self.apply.on_click(lambda _: self._apply())

@@ -45,6 +45,9 @@ STEP_SCALARS = np.dtype([
 position correction adds, J; load_potential() at its start, J; the largest residual velocity of its
 large islands, m/s."""
 
+OCCURRENCE = np.dtype([('member', np.int64), ('place', np.int64)], align=True)
+"""A member of an island that a degree of freedom moves, and its place in the member's support."""
+
 MEMBER = np.dtype([
     ('contact', np.int64), ('kind', np.int64), ('row', np.int64), ('friction', float),
     ('rolling_friction', float), ('correction', float), ('correction_compliance', float),
@@ -159,7 +162,7 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         coupled=np.zeros(max(rows, 8), np.int64),
         phi=np.zeros((contacts, 5)), local=np.zeros(5), lu=make_sparse_lu(nv, contacts, wide),
         occurrence_start=np.zeros(nv + 1, np.int64),
-        occurrences=np.zeros((contacts * wide, 2), np.int64))
+        occurrences=np.zeros(contacts * wide, OCCURRENCE))
 
 
 WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

@@ -33,32 +33,32 @@ simulation for minutes."""
 MINIMA = {'mass': 1e-4, 'size': 1e-4, 'radius': 1e-4, 'length': 1e-4}
 
 BODY = (
-    Field('shape', 'shape', 'shape', 'for contact and inertia'),
-    Field('size', 'size, m', 'vector', "full edges along the body's x, y, z"),
-    Field('radius', 'radius, m', 'number', ''),
-    Field('length', 'length, m', 'number', "along the body's z; of a capsule's cylinder"),
-    Field('mass', 'mass, kg', 'number', 'changes the inertia, unless that is set'),
-    Field('inertia', 'inertia, kg m²', 'text',
-          "moments about the body's x, y, z; empty: a uniform solid's"),
-    Field('position', 'position, m', 'vector', "centre of mass, doll's frame (x forward, z up)"),
-    Field('rotation', 'rotation, °', 'vector', 'roll, pitch, yaw about fixed axes x, y, z'),
-    Field('friction', 'friction', 'text', "coefficient, inf for no slip; empty: the scene's"),
-    Field('rolling_friction', 'rolling, m', 'text', "lever arm; empty: the scene's"),
-    Field('restitution', 'restitution', 'text', "0 to 1; empty: the scene's"),
-    Field('color', 'colour', 'color', 'picked, or typed: red, #1e90ff, 30 144 255'),
-    Field('no_collision', 'passes through', 'text', 'names of other bones of the doll, with which '
+    Field('shape', 'Shape', 'shape', 'For contact and inertia'),
+    Field('size', 'Size, m', 'vector', "Full edges along the body's x, y, z"),
+    Field('radius', 'Radius, m', 'number', ''),
+    Field('length', 'Length, m', 'number', "Along the body's z; of a capsule's cylinder"),
+    Field('mass', 'Mass, kg', 'number', 'Changes the inertia, unless that is set'),
+    Field('inertia', 'Inertia, kg m²', 'text',
+          "Moments about the body's x, y, z; empty: a uniform solid's"),
+    Field('position', 'Position, m', 'vector', "Centre of mass, doll's frame (x forward, z up)"),
+    Field('rotation', 'Rotation, °', 'vector', 'Roll, pitch, yaw about fixed axes x, y, z'),
+    Field('friction', 'Friction', 'text', "Coefficient, inf for no slip; empty: the scene's"),
+    Field('rolling_friction', 'Rolling, m', 'text', "Lever arm; empty: the scene's"),
+    Field('restitution', 'Restitution', 'text', "0 to 1; empty: the scene's"),
+    Field('color', 'Colour', 'color', 'Picked, or typed: red, #1e90ff, 30 144 255'),
+    Field('no_collision', 'Passes through', 'text', 'Names of other bones of the doll, with which '
           'this one does not collide; those that a joint connects never do'))
 
 JOINT = (
-    Field('kind', 'joint', 'joint', 'to the parent'),
-    Field('anchor', 'anchor, m', 'vector', "position of the joint, doll's frame"),
-    Field('axis_1', 'axis 1', 'vector', 'fixed in the parent; ball: twist axis'),
-    Field('axis_2', 'axis 2', 'vector', 'fixed in the child, perpendicular to axis 1'),
-    Field('limits_1', 'limits 1, °', 'text',
-          'lower, upper; ball: swing; child relative to parent; empty: free'),
-    Field('limits_2', 'limits 2, °', 'text', 'lower, upper; ball: twist; empty: free'),
-    Field('limits_3', 'limits 3, °', 'text', 'lower, upper; ball with two axes: twist'),
-    Field('damping', 'damping', 'number', 'N m s/rad about each axis'))
+    Field('kind', 'Joint', 'joint', 'To the parent'),
+    Field('anchor', 'Anchor, m', 'vector', "Position of the joint, doll's frame"),
+    Field('axis_1', 'Axis 1', 'vector', 'Fixed in the parent; ball: twist axis'),
+    Field('axis_2', 'Axis 2', 'vector', 'Fixed in the child, perpendicular to axis 1'),
+    Field('limits_1', 'Limits 1, °', 'text',
+          'Lower, upper; ball: swing; child relative to parent; empty: free'),
+    Field('limits_2', 'Limits 2, °', 'text', 'Lower, upper; ball: twist; empty: free'),
+    Field('limits_3', 'Limits 3, °', 'text', 'Lower, upper; ball with two axes: twist'),
+    Field('damping', 'Damping, N m s', 'number', 'Per radian, about each axis'))
 
 
 def read_bone(scene: Scene, name: str) -> FormValues:

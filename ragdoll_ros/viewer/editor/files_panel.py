@@ -43,27 +43,31 @@ class FilesPanel:
         """Name of another file that a second Save overwrites."""
         gui = server.gui
         self.place = gui.add_html(colored(f'Files are kept in {folder.path}', GREY))
-        self.saved = gui.add_dropdown('saved', (NONE,), hint='newest first; loads it')
-        self.name = gui.add_text('file', 'scene.yaml', hint=f'in {folder.path}')
-        self.save_button = gui.add_button('Save', icon='device-floppy',
-                                          hint='the whole scene with its dolls')
-        self.load_button = gui.add_button('Load', icon='folder-open',
-                                          hint='from that folder, or one of the shipped scenes')
-        self.download_button = gui.add_button('Download', icon='download')
+        self.saved = gui.add_dropdown('Saved', (NONE,), hint='Newest first; loads it')
+        self.name = gui.add_text('File', 'scene.yaml', hint=f'In {folder.path}')
+        self.actions = gui.add_button_group(
+            'Action', ('Save', 'Load', 'Download'), hint='The whole scene with its dolls; loads from '
+            'that folder, or one of the shipped scenes')
         self.upload_button = gui.add_upload_button(
             'Upload a scene or doll', icon='upload', mime_type=','.join(DOLLS))
         self.fit_button = gui.add_upload_button(
             'Fit a character', icon='man', mime_type=','.join(CHARACTERS),
-            hint=f'a skinned .glb, .gltf or .vrm, or a .urdf; up to {LARGEST_UPLOAD // 10**6} MB')
+            hint=f'A skinned .glb, .gltf or .vrm, or a .urdf; up to {LARGEST_UPLOAD // 10**6} MB')
         self.progress = gui.add_progress_bar(0.0, animated=True, visible=False)
         self.message = gui.add_html('')
         self.saved.on_update(lambda event: event.client and self._load_listed(event.target.value))
         self._update_list()
-        self.save_button.on_click(lambda _: self.save())
-        self.load_button.on_click(lambda _: self.load())
-        self.download_button.on_click(lambda event: self.download(event.client))
+        self.actions.on_click(self._on_action)
         self.upload_button.on_upload(lambda event: self._on_upload(event.target, self.upload))
         self.fit_button.on_upload(lambda event: self._on_upload(event.target, self.fit))
+
+    def _on_action(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        if event.target.value == 'Save':
+            self.save()
+        elif event.target.value == 'Load':
+            self.load()
+        else:
+            self.download(event.client)
 
     def forget(self) -> None:
         """Take note that the current scene is not from a file here."""

@@ -33,15 +33,15 @@ class EditorPanel:
                                    hint='E: pauses in the bind pose; Space runs')
         self.undo = gui.add_button('Undo', icon='arrow-back-up', hint='Ctrl+Z')
         self.redo = gui.add_button('Redo', icon='arrow-forward-up', hint='Ctrl+Shift+Z')
-        self.doll = gui.add_dropdown('doll', (NONE,), visible=False, hint='selects its root')
-        self.bone = gui.add_dropdown('bone', (NONE,), hint='or click on it')
+        self.doll = gui.add_dropdown('Doll', (NONE,), visible=False, hint='Selects its root')
+        self.bone = gui.add_dropdown('Bone', (NONE,), hint='Or click on it')
         self.tree = BoneTree(gui, select)
         self.advice = gui.add_html('')
-        self.limb = gui.add_checkbox('whole limb', False, hint='the subtree of the bone '
+        self.limb = gui.add_checkbox('Whole limb', False, hint='The subtree of the bone '
                                      'moves with it; else the body alone, and joints stay')
-        self.both = gui.add_checkbox('both sides', False,
-                                     hint='the bone on the other side becomes its mirror image')
-        self.snap = gui.add_checkbox('snap', False, hint='handles go in steps of 1 cm and 5°')
+        self.both = gui.add_checkbox('Both sides', False,
+                                     hint='The bone on the other side becomes its mirror image')
+        self.snap = gui.add_checkbox('Snap', False, hint='Handles go in steps of 1 cm and 5°')
         gui.add_html(style('form.css'))
         self.body_folder = gui.add_folder('Body')
         with self.body_folder:
@@ -55,7 +55,7 @@ class EditorPanel:
         self.message = gui.add_html('')
         self.growth_folder = gui.add_folder('Bones', expand_by_default=False)
         with self.growth_folder:
-            self.name = gui.add_text('name', 'new bone')
+            self.name = gui.add_text('Name', 'new bone')
             self.add = gui.add_button('Add a bone here', icon='plus')
             self.remove = gui.add_button('Remove this limb', icon='trash')
         self.parent = ''

@@ -57,14 +57,14 @@ class PushKeys:
         self.key_events = add_listener(gui, 'keys', 'arrow_keys.js', lambda page, down: self.take(
             page, down.split(), time.monotonic()))
         buttons = gui.add_button_group(
-            'Push', tuple(ARROWS), visible=can_push, hint='as seen in the picture: left, away from '
+            'Push', tuple(ARROWS), visible=can_push, hint='As seen in the picture: left, away from '
             'you, towards you, right; arrow keys do the same, and go on while held')
         self.strength = gui.add_slider('Strength, N', *STRENGTHS, step=STEP, initial_value=FORCE,
-                                       visible=can_push, hint='of a push, and the most of a '
+                                       visible=can_push, hint='Of a push, and the most of a '
                                        'held key')
         self.top_speed = gui.add_slider('Top speed, m/s', *TOP_SPEEDS, step=0.5,
                                         initial_value=TOP_SPEED, visible=can_push,
-                                        hint='that a held key brings the doll to')
+                                        hint='That a held key brings the doll to')
         self._effect = gui.add_html('', visible=can_push)
         self.strength.on_update(lambda _: self._show_effect())
         buttons.on_click(lambda event: self.tap(event.client, ARROWS[event.target.value]))
@@ -168,9 +168,9 @@ class PushKeys:
         """State the pushed bone and what a tap does."""
         if self._scene is None:
             return
-        text = (f'pushes {self._scene.bone_names[self.bone]}: click on another bone to push that'
-                f'<br>a tap gives {self._mass():.3g} kg '
-                f'{self.strength.value * TAP / self._mass():.2g} m/s')
+        text = (f'Pushes {self._scene.bone_names[self.bone]}. A click chooses another bone.'
+                f'<br>A tap gives {self._mass():.3g} kg '
+                f'{self.strength.value * TAP / self._mass():.2g} m/s.')
         content = f'<div style="font-size: 0.85em; padding: 0 1em 0.4em">{text}</div>'
         if content != self._effect.content:
             self._effect.content = content

@@ -46,8 +46,8 @@ class Field:
 
     @property
     def name(self) -> str:
-        """Label without the unit."""
-        return self.label.partition(', ')[0]
+        """Label without the unit, as in a sentence."""
+        return self.label.partition(', ')[0].lower()
 
     @property
     def unit(self) -> str:

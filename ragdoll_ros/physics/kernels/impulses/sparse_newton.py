@@ -103,8 +103,8 @@ def connect_bodies(s: System, ws: Workspace, m: int) -> int:
 
 @compiled
 def list_occurrences(island: Island, dofs: int, m: int) -> None:
-    """Write to island.occurrences the members whose support has each degree of freedom, and where,
-    as indices of lu.sets, by places.
+    """Write to island.occurrences the members whose support has each degree of freedom, and its
+    place there.
     """
     begin, listed, sets = island.occurrence_start, island.occurrences, island.lu.sets
     for i in range(dofs + 1):
@@ -117,7 +117,7 @@ def list_occurrences(island: Island, dofs: int, m: int) -> None:
     for k in range(m):
         for x in range(island.lu.sizes[k]):
             i = sets[k, x]
-            listed[begin[i], 0], listed[begin[i], 1] = k, x
+            listed[begin[i]].member, listed[begin[i]].place = k, x
             begin[i] += 1
     for i in range(dofs, 0, -1):
         begin[i] = begin[i - 1]
@@ -251,7 +251,7 @@ def solve_for_z(island: Island, dofs: int) -> bool:
         clear_row(lu, i)
         lu.row[i], dz[i] = 1.0, 0.0
         for at in range(island.occurrence_start[i], island.occurrence_start[i + 1]):
-            k, x = island.occurrences[at, 0], island.occurrences[at, 1]
+            k, x = island.occurrences[at].member, island.occurrences[at].place
             member, phi = island.members[k], island.phi[k]
             for e in range(member.kind):
                 dz[i] -= Y[member.row + e, x] * phi[e]
