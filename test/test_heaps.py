@@ -422,7 +422,7 @@ def test_a_low_stack_stands_and_sleeps(pile, accuracy):
 @each_setting
 @pytest.mark.parametrize('pile', list(PILES))
 def test_a_stack_stands_for_a_minute_and_sleeps(pile, accuracy, record_property):
-    """Seconds of CPU, and of PyBullet's engine for a tenth of that time, are told and not judged."""
+    """Seconds of CPU, also of PyBullet's engine by its first 6 s, are told and not judged."""
     lean, asleep, cost = lean_of(PILES[pile](), 60.0, accuracy)
     other, _, peer = lean_of(PILES[pile](), 6.0, accuracy, 'bullet')
     record_property('cost', f'{pile}, {accuracy}: {cost:.2f} s, lean {1e3 * lean:.3f} mm; '

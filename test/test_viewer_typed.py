@@ -120,7 +120,7 @@ def test_what_is_typed_is_used_to_the_digit_or_refused_in_words(view, label, eve
         view.wait(lambda expected=expected: said(view) or used(view, label) == expected)
         words = said(view)
         if words:
-            name = label.partition(',')[0]
+            name = label.partition(',')[0].lower()
             assert words[0].startswith(f'{name} must be ') and len(words[0].split()) > 4, words
             assert not re.search('[a-z][A-Z]', words[0]), words
             assert used(view, label) == before, (text, words)

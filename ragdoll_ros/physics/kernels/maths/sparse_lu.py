@@ -23,10 +23,10 @@ SparseLU = collections.namedtuple(
     'SparseLU', 'sets sizes start columns values inverse above_start above mark row set_head '
     'set_next child sibling')
 """A sparse factor. ``sets`` (m, k), of which ``sizes`` (m,) count: the cliques. Row i of U has
-``columns``, ascending, and ``values`` from start[i] to start[i + 1], and the reciprocal of its pivot
-in ``inverse``; the rows ``above`` that have an entry in column i are those from above_start[i] to
-above_start[i + 1], in order. ``row`` (n,): the row that is eliminated. The others are lists:
-cliques by their first index, children by their parent in the elimination tree."""
+``columns``, ascending, and ``values`` from start[i] to start[i + 1], and the reciprocal of its
+pivot in ``inverse``; the rows ``above`` that have an entry in column i are those from
+above_start[i] to above_start[i + 1], in order. ``row`` (n,): the row that is eliminated. The others
+are lists: cliques by their first index, children by their parent in the elimination tree."""
 
 
 def make_sparse_lu(n: int, sets: int, size: int) -> SparseLU:
