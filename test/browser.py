@@ -225,7 +225,7 @@ def opened(browser, url, scene, size=SIZE, first=False):
         yield view
     finally:
         view.close()
-    assert not view.errors
+    assert not view.errors, view.errors
 
 
 @contextmanager
