@@ -229,6 +229,16 @@ def opened(browser, url, scene, size=SIZE, first=False):
 
 
 @contextmanager
+def editing(scene, folder):
+    """The page of a shipped scene in a browser of its own, with a folder for its files."""
+    with (chromium() as context,
+          serving('--port', '0', '--scene', scene.name, '--folder', str(folder)) as url,
+          opened(context, url, scene, {'width': 1280, 'height': 800}, first=True) as view):
+        view.folder = folder
+        yield view
+
+
+@contextmanager
 def serving(*arguments, module='ragdoll_ros.viewer.command'):
     """Run what serves a page, until SIGTERM, on which it must end well; give the page's address."""
     process = subprocess.Popen([sys.executable, '-m', module, *arguments], cwd=ROOT,

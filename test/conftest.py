@@ -96,6 +96,21 @@ def ros():
     lock.close()
 
 
+@pytest.fixture(scope='session')
+def recording():
+    """The first 1.2 s of the scene `drop`."""
+    from ragdoll_ros.files.scene import load_scene
+    from ragdoll_ros.physics.simulation import Simulation
+    from ragdoll_ros.recordings.recording import Recorder
+    scene = load_scene('drop')
+    recorder = Recorder(scene)
+    with Simulation(scene) as simulation:
+        for _ in range(120):
+            recorder.take(simulation)
+            simulation.advance()
+    return recorder.recording()
+
+
 @pytest.fixture
 def peer(ros):
     """The other side of a node, for one test."""

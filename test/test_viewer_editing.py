@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from browser import chromium, opened, serving
+from browser import editing
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.viewer.editor import changes
@@ -18,12 +18,8 @@ NUMBERS = itertools.count()
 
 @pytest.fixture(scope='module')
 def view(tmp_path_factory):
-    """The page at the scene's start, paused; its folder as an attribute."""
-    folder = tmp_path_factory.mktemp('editing')
-    with (chromium() as context, serving('--port', '0', '--scene', 'drop', '--folder',
-                                         str(folder)) as url,
-          opened(context, url, SCENE, {'width': 1280, 'height': 800}, first=True) as view):
-        view.folder = folder
+    """The page at the scene's start, paused."""
+    with editing(SCENE, tmp_path_factory.mktemp('editing')) as view:
         view.hold_at(SCENE, START)
         yield view
 

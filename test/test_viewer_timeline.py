@@ -18,7 +18,6 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.recordings.recording import Recorder
 from ragdoll_ros.recordings.save import FORMATS
 from ragdoll_ros.viewer.sources.playback import PlaybackSource
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
@@ -298,27 +297,18 @@ def test_plots_begin_anew_with_another_scene():
         wait(lambda: all(handle.data[0][-1] < 0.5 or not handle.visible for handle in handles))
 
 
-def test_plots_begin_anew_with_a_recording(states):
+def test_plots_begin_anew_with_a_recording(recording):
     """Played a second time, it is plotted as the first."""
-    with served(PlaybackSource(recording(states))) as page:
+    with served(PlaybackSource(recording)) as page:
         client, gap = page.open(), page.plots.gap.handle
         wait(lambda: gap.data[0][-1:].sum() > 0.9)
         client.press(page, 'Reset')
         wait(lambda: 0 < gap.data[0][-1] < 0.9)
 
 
-def recording(states):
-    recorder = Recorder(DROP)
-    with Simulation(DROP) as simulation:
-        for _ in range(120):
-            recorder.take(simulation)
-            simulation.advance()
-    return recorder.recording()
-
-
-def test_a_file_has_the_same_timeline(states):
+def test_a_file_has_the_same_timeline(recording, states):
     """All of it from the start on, with the ground that it touches."""
-    with served(PlaybackSource(recording(states))) as page:
+    with served(PlaybackSource(recording)) as page:
         client = page.open()
         wait(lambda: page.frame)
         clip = page.timeline.clip

@@ -11,8 +11,6 @@ from browser import View, chromium
 from page_client import served, wait
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.recordings.recording import Recorder
 from ragdoll_ros.viewer.sources.playback import PlaybackSource
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 
@@ -247,19 +245,9 @@ def test_each_control_has_a_name(view):
     assert names == ['Reset', 'Step back', 'Pause', 'Step', 'Time', 'Speed', 'Timeline', 'Live']
 
 
-@pytest.fixture(scope='module')
-def run():
-    recorder = Recorder(DROP)
-    with Simulation(DROP) as simulation:
-        for _ in range(120):
-            recorder.take(simulation)
-            simulation.advance()
-    return recorder.recording()
-
-
-def test_a_recording_is_moved_itself(run):
+def test_a_recording_is_moved_itself(recording):
     """It has no other time: what is typed, stepped or dragged is where it goes on."""
-    with served(PlaybackSource(run)) as page:
+    with served(PlaybackSource(recording)) as page:
         client = page.open()
         wait(lambda: page.transport.shown)
         for text, instant in (('position 0.5', 0.5), ('back', 0.49), ('step', 0.5),
@@ -267,7 +255,7 @@ def test_a_recording_is_moved_itself(run):
             client.steer(page, text)
             wait(lambda instant=instant: page.frame.time == pytest.approx(instant, abs=1e-9))
             assert page.timeline.is_live and page.source.status.paused
-        np.testing.assert_array_equal(page.frame.state.positions, run.positions[-1])
+        np.testing.assert_array_equal(page.frame.state.positions, recording.positions[-1])
         client.steer(page, 'position 0.5')
         wait(lambda: page.frame.time == 0.5)
         client.steer(page, 'speed 0.25')

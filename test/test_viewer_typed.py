@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 import pytest
-from browser import chromium, opened, serving
+from browser import editing
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.viewer.editor import changes
@@ -61,12 +61,8 @@ HANDLE = """() => {
 
 @pytest.fixture(scope='module')
 def view(tmp_path_factory):
-    """The page, with a bone chosen; its folder as an attribute."""
-    folder = tmp_path_factory.mktemp('typed')
-    with (chromium() as context, serving('--port', '0', '--scene', 'drop', '--folder',
-                                         str(folder)) as url,
-          opened(context, url, SCENE, {'width': 1280, 'height': 800}, first=True) as view):
-        view.folder = folder
+    """The page, with a bone chosen."""
+    with editing(SCENE, tmp_path_factory.mktemp('typed')) as view:
         view.tab('Edit')
         view.row('Bone').locator('input').first.click()
         view.page.get_by_role('option', name=BONE, exact=True).click()
