@@ -37,7 +37,7 @@ function listen(send) {
   const reset = find('[data-do=reset]'), time = find('.time input'), speed = find('select');
   const range = find('[type=range]'), strip = find('.track span'), live = find('.live');
   const badge = find('.badge'), notice = find('.notice');
-  let byPointer = false, hiding = null, received = 0, last = '', loading = '';
+  let byPointer = false, hiding = null, received = 0, last = '', loading = '', looks = 0;
 
   const put = (element, key, value) => { if (element[key] !== value) element[key] = value; };
   // The server tells the time twice a second; between, it goes on here.
@@ -94,7 +94,10 @@ function listen(send) {
     hiding = setTimeout(() => { notice.hidden = true; }, 4000);
   };
   if (window.ragdollTransport) window.ragdollShow(window.ragdollTransport);
-  setInterval(() => { if (window.ragdollTransport?.speed !== undefined) showTime(); }, 50);
+  setInterval(() => {
+    if (window.ragdollTransport?.speed !== undefined) showTime();
+    else if (looks++ % 40 === 0) send('repeat');  // what came before this script may be lost
+  }, 50);
 
   bar.addEventListener('pointerdown', () => { byPointer = true; });
   bar.addEventListener('click', (event) => {
