@@ -261,8 +261,8 @@ def test_the_view_is_saved_as_png(view, tmp_path):
     canvas = view.page.locator('canvas').first.bounding_box()
     share, width = picture.shape[0] / canvas['height'], canvas['width']
     x, y = (view.pixels(START[:1])[0] * share).astype(int)
-    assert share >= 0.75 * SHARPNESS and picture.shape[2] == 3
     # Viser rounds both sides to pixels, and draws any share of them where a page is slow.
+    assert picture.shape[0] + 1 > 0.75 * SHARPNESS * canvas['height'] and picture.shape[2] == 3
     assert picture.shape[1] == pytest.approx(share * width, abs=1)
     assert (picture[2, 2] == 255).all() and picture[y, x].min() < 200
 

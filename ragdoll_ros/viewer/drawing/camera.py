@@ -26,8 +26,9 @@ FAR = 1000.0
 MAX_DISTANCE_RATIO = 4
 """A camera farther away than this times the distance of the home view is moved to that."""
 
-MOST_HOMES = 4
-"""Home views of a page that are remembered: a window changes its size in several steps."""
+MOST_HOMES = 32
+"""Home views of a page that are remembered: a window changes its size in several steps, and a slow
+page still tells of the first when the last is computed."""
 
 TOLERANCE = 1e-3
 """m within which a camera counts as being in the home view."""
@@ -64,6 +65,7 @@ class Cameras:
         server.initial_camera.position, server.initial_camera.look_at = INITIAL_CAMERA
         server.initial_camera.fov = FIELD_OF_VIEW
         server.gui.add_html(script('camera_follow.js', NODE=FOLLOWED_NODE))
+        server.gui.add_html(script('picture_size.js'))
         server.gui.add_html(script('edge_arrow.js', NODE=DOLL_NODE))
         server.on_client_connect(self._on_connect)
 
