@@ -169,6 +169,7 @@ def test_random_chains_and_trees_fly_in_bounded_ticks(first):
 
 
 @pytest.mark.slow
-def test_a_thousand_random_chains_and_trees_fly_in_bounded_ticks():
-    cut = sum(assert_bounded(number) > 0 for number in range(1000))
-    assert cut <= 50, 'few are so fast that their ticks are cut short'
+@pytest.mark.parametrize('first', range(0, 1000, 100))
+def test_a_thousand_random_chains_and_trees_fly_in_bounded_ticks(first):
+    cut = sum(assert_bounded(number) > 0 for number in range(first, first + 100))
+    assert cut <= 5, 'few are so fast that their ticks are cut short'

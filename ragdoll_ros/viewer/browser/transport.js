@@ -54,10 +54,7 @@ function listen(send) {
     range.setAttribute('aria-valuetext', `${now} s`);
   };
   window.ragdollShow = (state) => {
-    if (state.speed === undefined) {  // what came before was not for this page
-      send('repeat');
-      return;
-    }
+    if (state.speed === undefined) return;  // the rest was lost and is asked for below
     const name = state.playing ? 'Pause' : 'Play';
     if (toggle.ariaLabel !== name) {
       toggle.ariaLabel = name;

@@ -46,8 +46,8 @@ class FilesPanel:
         self.saved = gui.add_dropdown('Saved', (NONE,), hint='Newest first; loads it')
         self.name = gui.add_text('File', 'scene.yaml', hint=f'In {folder.path}')
         self.actions = gui.add_button_group(
-            'Action', ('Save', 'Load', 'Download'), hint='The whole scene with its dolls. Loads '
-            'from that folder, or a shipped scene')
+            'Action', ('Save', 'Load', 'Download'), hint='Save and Download write the '
+            'whole scene with its dolls; Load reads a file of the folder above, or a shipped scene')
         self.upload_button = gui.add_upload_button(
             'Upload a scene or doll', icon='upload', mime_type=','.join(DOLLS))
         self.fit_button = gui.add_upload_button(
