@@ -14,7 +14,8 @@ from viser import _messages
 VERSIONS = '>=1.1.1,<1.2'
 
 CLIENT_NAMES = ('__viserMutable', 'sendMessage', 'scene', 'nodeRefFromName', 'camera',
-                'cameraControl', 'requestRender', 'canvas', 'GuiUpdateMessage', 'Uploading ')
+                'cameraControl', 'requestRender', 'canvas', 'sendCamera',
+                'GuiUpdateMessage', 'Uploading ')
 """What browser/*.js uses of viser's own client: its mutable state, a message, a notice's text."""
 
 CLIENT_PACKAGES = {'@mantine/core': '^9.', '@mantine/notifications': '^9.',
