@@ -97,6 +97,10 @@ class UnknownBone(ModelError):
     """No bone has the name."""
 
 
+class UnknownDoll(ModelError):
+    """No doll has the name."""
+
+
 class DuplicateName(ModelError):
     """Two of a kind have the same name."""
 

@@ -94,6 +94,17 @@ class LoggedSimulation(Simulation):
                                 for key, value in vars(coordinates).items()})
         return state
 
+    def set_state(self, doll: str, position: Sequence[float] | None = None,
+                  orientation: Sequence[float] | None = None,
+                  velocity: Sequence[float] | None = None,
+                  spin: Sequence[float] | None = None) -> State:
+        given = {'position': position, 'orientation': orientation, 'velocity': velocity,
+                 'spin': spin}
+        state = super().set_state(doll, **given)
+        self.on_event('set_state', {'doll': doll, **{
+            key: list(map(float, values)) for key, values in given.items() if values is not None}})
+        return state
+
     def reset(self) -> State:
         state = super().reset()
         self.on_event('reset', self.conditions)
@@ -136,7 +147,7 @@ _ACTIONS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
-       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp')},
+       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),
     'parts': lambda simulation, parts: setattr(simulation, 'samples_per_tick', parts),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),

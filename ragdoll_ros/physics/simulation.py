@@ -15,6 +15,7 @@ from ..model.drive import Drive
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
+from ..model.vectors import finite_floats, unit_vector
 from .accuracy import Accuracy, resolve_accuracy
 from .actions.grab import DRAG_TIME, Grab, Hands
 from .actions.joint_springs import JointSpring, JointSprings
@@ -353,6 +354,50 @@ class Simulation:
         self._engine.discard(self._start)
         self._start = self._engine.save()
         return self.reset()
+
+    def set_state(self, doll: str, position: Sequence[float] | None = None,
+                  orientation: Sequence[float] | None = None,
+                  velocity: Sequence[float] | None = None,
+                  spin: Sequence[float] | None = None) -> State:
+        """Set pose and velocities of a doll's root from now on; its joint angles and rates stay.
+
+        Simulated time continues, and other dolls go on as before. The change of energy counts as
+        work of pushes. A doll that would be deep in the ground is lifted onto it. If it has swings,
+        all swings restart at rest.
+
+        Args:
+            doll: name of its placement in the scene.
+            position: (3,) m, of the root's centre of mass, world frame; None: as it is.
+            orientation: quaternion x, y, z, w, world frame; None: as it is.
+            velocity: (3,) m/s, of the root's centre of mass, world frame; None: as it is.
+            spin: (3,) rad/s, world frame; None: as it is.
+
+        Raises:
+            UnknownDoll: the scene has no such doll.
+            NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none.
+
+        >>> simulation.set_state('doll', velocity=(0, 0, 2)).linear_velocities[0].round(6).tolist()
+        [0.0, 0.0, 2.0]
+        """
+        names = [placement.name for placement in self.scene.dolls]
+        if doll not in names:
+            raise errors.UnknownDoll('doll', doll, errors.one_of(names, doll))
+        index, layout, here = names.index(doll), self._engine.layout, self._engine.coordinates
+        for values, own, name, given in (
+                (here.q, layout.root_positions, 'position', position),
+                (here.v, layout.root_velocities, 'velocity', velocity),
+                (here.v, layout.root_angular_velocities, 'spin', spin)):
+            if given is not None:
+                values[own[index]] = finite_floats(name, given)
+        if orientation is not None:
+            here.q[layout.root_orientations[index]] = unit_vector(
+                'orientation', orientation, 'a quaternion x, y, z, w, not zero', 4)
+        self._engine.set_doll(index, here)
+        self._sleep_detector.restart(np.arange(len(names)) == index)
+        self.asleep = False
+        if self._swings and self.scene.dolls[index].doll.swings:
+            self._swings.reset(self.time, self.state)
+        return self.state
 
     def checkpoint(self) -> tuple[int, object]:
         """Save time and state for go_back(); cheap enough for every tick."""

@@ -195,6 +195,12 @@ class Engine(Protocol):
         the ground is lifted onto it.
         """
 
+    def set_doll(self, doll: int, coordinates: GeneralizedState) -> None:
+        """Set the coordinates and velocities of one doll to its own in ``coordinates``, and wake
+        all of its old cluster. The change of energy counts as work of pushes. If it is deeper in
+        the ground than allowed_penetration(), it is lifted onto it.
+        """
+
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
         """Integrate over ``duration`` s, under loads that act during all of it."""

@@ -170,6 +170,15 @@ class Clusters:
                 cluster.state.v[:] = velocities[cluster.v_indices]
                 cluster.state.dense_step[:] = 0
 
+    def set_doll(self, doll: int, q: np.ndarray, v: np.ndarray) -> None:
+        """Set the coordinates and velocities of a doll to its own in those of the scene (nq,),
+        (nv,), and discard what its cluster has computed from the old ones.
+        """
+        self.q[self._q[doll]], self.v[self._v[doll]] = q[self._q[doll]], v[self._v[doll]]
+        cluster = self.members[self.of_doll[doll]]
+        cluster.state.q[:], cluster.state.v[:] = self.q[cluster.q_indices], self.v[cluster.v_indices]
+        _invalidate(cluster)
+
     def add_work(self, energies: np.ndarray) -> None:
         """Add energies (d,) J to the work of pushes of the dolls' clusters."""
         np.add.at(self.stats['work_pushes'], self._firsts[self.of_doll], energies)

@@ -3,7 +3,7 @@
 The algorithm of a tick is in kernels/advance.py.
 """
 import dataclasses
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 
 import numpy as np
 
@@ -85,17 +85,29 @@ class RigidEngine:
     def set_coordinates(self, coordinates: GeneralizedState) -> None:
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:] = coordinates.q
-        v[:] = self._in_root_axes(coordinates.v)
+        v[:] = self._in_root_axes(coordinates)
         clusters.stats[:] = 0
         clusters.separate()
         self.sleeping[:] = False
         self._refresh()
-        self._lift_out_of_ground()
+        self._lift_out_of_ground(range(len(self.scene.dolls)))
         clusters.exclude([own | JOINT_OUTSIDE_LIMITS for own in self._initial_overlaps])
         self._refresh()
         self._age = MAX_AGE
         self._start_energies = self.doll_totals.energy.copy()
         self._last_start = None
+
+    def set_doll(self, doll: int, coordinates: GeneralizedState) -> None:
+        clusters, before = self._clusters, self.doll_totals.energy
+        self._wake(self.cluster_of_doll == self.cluster_of_doll[doll])
+        clusters.set_doll(doll, coordinates.q, self._in_root_axes(coordinates))
+        self._refresh()
+        self._lift_out_of_ground([doll])
+        clusters.set_doll(doll, clusters.q, clusters.v)
+        self._refresh()
+        self._age = MAX_AGE
+        self._last_start = None
+        clusters.add_work(self.doll_totals.energy - before)
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
@@ -115,7 +127,7 @@ class RigidEngine:
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
         before = self.doll_totals.energy
-        self._clusters.set_velocities(dolls, self._in_root_axes(velocities))
+        self._clusters.set_velocities(dolls, self._in_root_axes(GeneralizedState(self._clusters.q, velocities)))
         self._last_start = None
         self._refresh()
         self._clusters.add_work(self.doll_totals.energy - before)
@@ -127,7 +139,7 @@ class RigidEngine:
         fine = dataclasses.replace(coarse, step=COPY_START * coarse.step / 2)
         saved = clusters.save_states(dolls)
         try:
-            clusters.set_velocities(dolls, self._in_root_axes(velocities))
+            clusters.set_velocities(dolls, self._in_root_axes(GeneralizedState(self._clusters.q, velocities)))
             clusters.advance(0.0, fine, ~dolls)
             yield clusters.sums['kinetic'].copy()
             clusters.advance(COPY_START * interval, fine, ~dolls)
@@ -267,20 +279,21 @@ class RigidEngine:
         self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.sleeping), bool))
         self._update_state()
 
-    def _in_root_axes(self, velocities: np.ndarray) -> np.ndarray:
-        """Generalized velocities (nv,) with those of the roots' rotation along the roots' axes."""
-        v = velocities.copy()
-        orientations = rotation.inverse(self._clusters.q[self.layout.root_orientations])
+    def _in_root_axes(self, coordinates: GeneralizedState) -> np.ndarray:
+        """Their velocities (nv,), with those of the roots' rotation along the roots' axes."""
+        v = coordinates.v.copy()
+        orientations = rotation.inverse(coordinates.q[self.layout.root_orientations])
         v[self._spins] = rotation.rotate(orientations, v[self._spins])
         return v
 
-    def _lift_out_of_ground(self) -> None:
-        """Move dolls that penetrate the ground by more than is allowed onto it."""
+    def _lift_out_of_ground(self, dolls: Iterable[int]) -> None:
+        """Move those ``dolls`` that penetrate the ground by more than is allowed onto it."""
         if self.scene.ground is None:
             return
         depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
-        for doll in np.flatnonzero(depths > allowed_penetration(self.scene)):
+        sunk = depths > allowed_penetration(self.scene)
+        for doll in (doll for doll in dolls if sunk[doll]):
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)
 

@@ -2,7 +2,7 @@
 import math
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -88,11 +88,21 @@ class SubsteppedEngine(ABC):
     def set_coordinates(self, coordinates: GeneralizedState) -> None:
         self.sleeping[:] = False
         self._set_state(coordinates)
-        self._lift_out_of_ground()
+        self._lift_out_of_ground(range(len(self.sleeping)))
         self._exclude_overlaps()
         self._invalidate()
         self._account = EnergyAccount.opened(self.doll_totals.energy)
         self._taken = 0
+
+    def set_doll(self, doll: int, coordinates: GeneralizedState) -> None:
+        before, here = self.doll_totals.energy.sum(), self.coordinates
+        q, v = here.q.copy(), here.v.copy()
+        q[self.layout.doll_q[doll]] = coordinates.q[self.layout.doll_q[doll]]
+        v[self.layout.doll_v[doll]] = coordinates.v[self.layout.doll_v[doll]]
+        self.sleeping[:] = False
+        self._set_state(GeneralizedState(q, v))
+        self._lift_out_of_ground([doll])
+        self._account.add_work(doll, self.doll_totals.energy.sum() - before, by_hand=False)
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
@@ -200,11 +210,12 @@ class SubsteppedEngine(ABC):
         """Correct energy and momentum after an interval in which these pairs of dolls touched."""
         raise NotImplementedError
 
-    def _lift_out_of_ground(self) -> None:
-        """Raise dolls that penetrate the ground: else they stay in it, or are thrown out."""
+    def _lift_out_of_ground(self, dolls: Sequence[int]) -> None:
+        """Raise those ``dolls`` that penetrate the ground: they would stay in it or be thrown out.
+        """
         heights = self._heights(self.state)
         depths = -np.array([heights[own].min() for own in self.scene.bone_slices])
-        sunk = depths > allowed_penetration(self.scene)
+        sunk = (depths > allowed_penetration(self.scene)) & np.isin(np.arange(len(depths)), dolls)
         if sunk.any():
             q = self.coordinates.q.copy()
             q[self.layout.root_positions] += np.outer(np.where(sunk, depths, 0),
