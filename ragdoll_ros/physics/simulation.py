@@ -17,7 +17,7 @@ from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
 from ..model.vectors import finite_floats, unit_vector
 from .accuracy import Accuracy, resolve_accuracy
-from .actions.grab import DRAG_TIME, Grab, Hands
+from .actions.grab import DRAG_TIME, Grab, Hands, checked_point
 from .actions.joint_springs import JointSpring, JointSprings
 from .actions.push_queue import PushQueue
 from .engine.protocol import Contacts, Engine, Springs
@@ -374,7 +374,8 @@ class Simulation:
 
         Raises:
             UnknownDoll: the scene has no such doll.
-            NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none.
+            NotFinite, NotUnit, WrongForm, OutOfRange: for a vector or quaternion that is none, or
+                a position that is too far away.
 
         >>> simulation.set_state('doll', velocity=(0, 0, 2)).linear_velocities[0].round(6).tolist()
         [0.0, 0.0, 2.0]
@@ -383,12 +384,12 @@ class Simulation:
         if doll not in names:
             raise errors.UnknownDoll('doll', doll, errors.one_of(names, doll))
         index, layout, here = names.index(doll), self._engine.layout, self._engine.coordinates
-        for values, own, name, given in (
-                (here.q, layout.root_positions, 'position', position),
-                (here.v, layout.root_velocities, 'velocity', velocity),
-                (here.v, layout.root_angular_velocities, 'spin', spin)):
+        for values, own, name, given, checked in (
+                (here.q, layout.root_positions, 'position', position, checked_point),
+                (here.v, layout.root_velocities, 'velocity', velocity, finite_floats),
+                (here.v, layout.root_angular_velocities, 'spin', spin, finite_floats)):
             if given is not None:
-                values[own[index]] = finite_floats(name, given)
+                values[own[index]] = checked(name, given)
         if orientation is not None:
             here.q[layout.root_orientations[index]] = unit_vector(
                 'orientation', orientation, 'a quaternion x, y, z, w, not zero', 4)

@@ -25,6 +25,7 @@ from .event_log import EventLog
 from .imu.publishers import ImuPublishers
 from .inputs.input_counts import InputCounts
 from .inputs.interactive_marker_server import InteractiveMarkerServer
+from .inputs.state_subscription import StateSubscription
 from .inputs.subscriptions import PushSubscriptions
 from .log_lines import end_line, start_line
 from .outputs import Outputs
@@ -77,6 +78,7 @@ class RagdollNode(Node):
         self._outputs, self._imus = Outputs(self), ImuPublishers(self)
         self._event_log = EventLog(self)
         self.inputs = PushSubscriptions(self, self.input_counts)
+        self.states = StateSubscription(self, self.input_counts, self._show_if_paused)
         self.interactive = InteractiveMarkerServer(self, self.input_counts, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
                                         self._diagnostic_values, self._diagnostics_stamp)
@@ -199,6 +201,12 @@ class RagdollNode(Node):
         self._outputs.publish(simulation, self.stamp, now, self.paused)
         self.interactive.publish(now, self.paused)
 
+    def _show_if_paused(self) -> None:
+        """Publish a state that was set while paused; else the next tick does."""
+        if self.paused:
+            self._stamps.advance()
+            self._publish()
+
     def _publish_start(self) -> None:
         """Publish after a reset or new scene, /diagnostics, which maps stamps to time, first;
         restart ticks.
@@ -217,8 +225,9 @@ class RagdollNode(Node):
     def _set_simulation(self, simulation: Simulation) -> None:
         """Connect a simulation and the current settings to all parts of the node."""
         self._event_log.set_simulation(simulation)
-        self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
-        self.inputs.settings = self.settings
+        self.simulation = self.inputs.simulation = self.states.simulation = simulation
+        self._diagnostics.simulation = simulation
+        self.inputs.settings = self.states.settings = self.settings
         self.recovery.set_simulation(simulation)
         self._outputs.set_scene(simulation.scene, self.settings.frame_id,
                                 self.settings.publish_tf)
@@ -241,7 +250,8 @@ class RagdollNode(Node):
 
     def _apply(self, changed: set[str]) -> None:
         """Carry out a change of the settings."""
-        settings = self.inputs.settings = self.interactive.settings = self.settings
+        settings = self.settings
+        self.inputs.settings = self.states.settings = self.interactive.settings = settings
         self._event_log.publish('parameters', {name: getattr(settings, name)
                                                for name in sorted(changed)})
         self._outputs.set_clock_publisher(settings.publish_clock)

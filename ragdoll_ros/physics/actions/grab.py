@@ -73,12 +73,12 @@ class Hands:
              target: Sequence[float] | None, state: State) -> None:
         """Attach a hand to a point of a bone; see Simulation.grab()."""
         index = self._scene.bone_index(bone)
-        held = np.array(_checked('point', point))
+        held = np.array(checked_point('point', point))
         reach = REACH * math.hypot(*self._scene.bones[index].shape.half_extents)
         if math.hypot(*held) > reach:
             raise errors.OutOfRange('point', point, f'at most {reach:.3g} m from the centre')
         now, _ = point_motion(state, index, held)
-        aim = now if target is None else np.array(_checked('target', target))
+        aim = now if target is None else np.array(checked_point('target', target))
         self.let_go(name)
         if len(self._springs) >= MAX_HANDS:
             raise errors.OutOfRange('hands', MAX_HANDS + 1, f'at most {MAX_HANDS}')
@@ -89,7 +89,7 @@ class Hands:
 
     def drag(self, name: str, target: Sequence[float], within: float) -> None:
         """Move a hand; see Simulation.drag()."""
-        aim = np.array(_checked('target', target))
+        aim = np.array(checked_point('target', target))
         errors.check_range('within', within, 0.0, 1e6)
         if name in self._springs:
             self._springs[name] = dataclasses.replace(self._springs[name], target=aim, left=within)
@@ -103,7 +103,8 @@ class Hands:
         self._springs = {name: spring.after(duration) for name, spring in self._springs.items()}
 
 
-def _checked(name: str, values: Sequence[float]) -> Vector:
+def checked_point(name: str, values: Sequence[float]) -> Vector:
+    """A point (3,) m. Raises NotFinite, OutOfRange."""
     values = floats(values)
     errors.check_finite(name, values)
     if len(values) != 3 or max(map(abs, values)) > MAX_COORDINATE:

@@ -1,0 +1,69 @@
+"""The subscription that sets the state of a doll: Odometry becomes Simulation.set_state()."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from geometry_msgs.msg import Point, Vector3
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+
+from ...model import errors, rotation
+from ...model.drive import MAX_SPEED
+from ...model.ragdoll import WORLD
+from ...model.vectors import Vector, clamp_norm, unit_vector
+from ...physics.simulation import Simulation
+from ..parameters.node_settings import NodeSettings
+from .input_counts import InputCounts
+
+TOPIC = '~/set_state'
+
+
+class StateSubscription:
+    """Subscription to ~/set_state.
+
+    ``pose`` is the root's in the world frame. ``twist`` is along the root's own axes, as nav_msgs
+    defines it for ``child_frame_id``, the name of the doll. Covariances are ignored. ``after`` is
+    called when a state has been set.
+    """
+
+    def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None]) -> None:
+        self._counts, self._after = counts, after
+        self.simulation: Simulation
+        self.settings: NodeSettings
+        node.create_subscription(Odometry, TOPIC, self.on_odometry, 10)
+
+    def on_odometry(self, message: Odometry) -> None:
+        """Set pose and velocities of a doll; a message that is wrong is refused and counted."""
+        try:
+            self._set(message)
+        except errors.ModelError as error:
+            self._counts.refuse(TOPIC, error)
+        else:
+            self._after()
+
+    def _set(self, message: Odometry) -> None:
+        frame = message.header.frame_id
+        if frame not in (WORLD, self.settings.frame_id):
+            raise errors.WrongForm('header.frame_id', frame, self.settings.frame_id)
+        pose, twist = message.pose.pose, message.twist.twist
+        q = pose.orientation
+        orientation = unit_vector('pose.orientation', (q.x, q.y, q.z, q.w),
+                                  'a quaternion x, y, z, w, not zero', 4)
+        velocity, spin = (
+            tuple(rotation.rotate(orientation, self._limited(f'twist.{name}', vector)).tolist())
+            for name, vector in (('linear', twist.linear), ('angular', twist.angular)))
+        self.simulation.set_state(message.child_frame_id, _xyz(pose.position), orientation,
+                                  velocity, spin)
+
+    def _limited(self, name: str, vector: Vector3) -> Vector:
+        """The vector, shortened to MAX_SPEED. NotFinite if it is not finite."""
+        values = _xyz(vector)
+        errors.check_finite(name, values)
+        result, length = clamp_norm(values, MAX_SPEED)
+        if length > MAX_SPEED:
+            self._counts.clamp(TOPIC, f'{name} of {length:g} to the limit, {MAX_SPEED:g}')
+        return result
+
+
+def _xyz(vector: Point | Vector3) -> Vector:
+    return vector.x, vector.y, vector.z
