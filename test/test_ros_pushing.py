@@ -214,3 +214,32 @@ def test_an_arrow_at_the_edge_points_to_what_is_outside(view, page, heard):
     assert not page.display.follow.value
     view.key('h')
     view.wait(lambda: view.page.evaluate(ARROW) is None)
+
+
+def test_a_ball_is_thrown_where_one_clicks(view, page, heard):
+    """The last test of the node, as the ball stays. A drag of the view throws nothing."""
+    poses, _, events = heard
+    place(view, page, heard, 0.0)
+    frame = view.page.locator('canvas').first.bounding_box()
+    corner = frame['x'] + 60, frame['y'] + 60
+    view.page.mouse.move(*view.pixels([START[0]])[0])
+    view.wait(lambda: hovered(page) == 'torso 0.0 m/s')
+    view.key('t')
+    # From its start again, with the ball, which flies at the torso from +x.
+    thrown = view.wait(lambda: events_of(events, 'set_state'))[0]
+    assert thrown['doll'] == 'ball' and thrown['velocity'][0] < -9
+    view.wait(lambda: page.frame.scene.dolls[-1].name == 'ball'
+              and page.controls.pushes.motion.velocities()[0][0] < -0.2)
+    assert len(poses[-1][1].poses) == len(START) + 1
+    view.page.get_by_label('Throw a ball by a click').check()
+    view.wait(lambda: page.controls.ball.takes_clicks)
+    view.page.mouse.move(*corner)
+    view.page.mouse.down()
+    view.page.mouse.move(corner[0] + 80, corner[1] + 10, steps=4)
+    view.page.mouse.up()
+    view.look(CENTER + (5.0, 0.0, 0.0), CENTER)
+    view.page.mouse.click(*corner)
+    view.wait(lambda: len(events_of(events, 'set_state')) == 2)
+    # Away, to the left and up, as seen from +x.
+    assert (np.sign(events_of(events, 'set_state')[1]['velocity']) == (-1, -1, 1)).all()
+    view.page.get_by_label('Throw a ball by a click').uncheck()

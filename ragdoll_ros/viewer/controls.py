@@ -9,6 +9,7 @@ import viser
 from ..files.config import scene_names
 from ..model.errors import RagdollError
 from ..physics.engine.registry import ENGINES
+from .pushing.ball import BallThrower
 from .pushing.push_keys import PushKeys
 from .sources.source import Source, SourceStatus
 
@@ -32,6 +33,7 @@ class Controls:
         self._loop = server.get_event_loop()
         gui, is_simulated = server.gui, source.recording is None
         self.pushes = PushKeys(server, source)
+        self.ball = BallThrower(server, source)
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
         self.first_scenes = gui.add_button_group(

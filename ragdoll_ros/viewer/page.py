@@ -37,8 +37,8 @@ IDLE_PERIOD = 0.1
 """s between two checks for an open page."""
 
 SIMULATION_HINT = ('<span class="ragdoll-mouse">Drag a bone. Arrow keys push, tap or hold; a click '
-                   'on a bone chooses which. Space pauses, R resets, E edits, H shows the home '
-                   'view.</span><span class="ragdoll-touch">Drag a bone with one finger. The '
+                   'on a bone chooses which. T throws a ball. Space pauses, R resets, E edits, '
+                   'H shows the home view.</span><span class="ragdoll-touch">Drag a bone with one finger. The '
                    'arrows below push; a tap on a bone chooses which. Two fingers move the view.'
                    '</span>')
 RECORDING_HINT = ('A recorded run. Space pauses, R restarts, drag the bar below the picture '
@@ -98,6 +98,10 @@ class Page:
         self.cameras = Cameras(server)
         self._auto_follow = AutoFollow(self.display.follow)
         self._hover = Hover(server)
+        self.controls.ball.frame = self._grabbable_frame
+        self.controls.ball.refuse = self.transport.refuse
+        self.controls.ball.is_editing = lambda: self.editor is not None and self.editor.editing
+        self.controls.ball.add_key(server, self._hover)
         self._pointer = Pointer(source, self._grabbable_frame, self._select, self.transport.refuse)
         self.controls.pushes.may_push = lambda: self.timeline.is_live
         self.controls.pushes.refuse = self.transport.refuse
@@ -161,6 +165,7 @@ class Page:
         bone = self.controls.pushes.bone
         self.transport.update(live, frame, status, now)
         self.cameras.follow(frame, bone, now, self.display.follow.value)
+        self.controls.ball.update(live, self.controls.pushes.motion)
         self._hover.show(frame, self.controls.pushes.motion, now)
         self.settings.show(status, live.scene, now)
 
@@ -173,6 +178,8 @@ class Page:
 
     def _select(self, bone: str, add: bool) -> None:
         """Push a bone that was clicked from now on, and edit it; ``add``: besides others."""
+        if self.controls.ball.takes_clicks:
+            return
         self.controls.pushes.choose(bone)
         if self.editor is not None:
             self.editor.select(bone, add)

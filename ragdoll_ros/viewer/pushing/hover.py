@@ -42,6 +42,10 @@ class Hover:
         else:
             self._pointers[page] = x, y
 
+    def line_of_sight(self, client: viser.ClientHandle) -> tuple[np.ndarray, np.ndarray]:
+        """Origin and direction (3,) through a page's pointer, or else the middle of its picture."""
+        return ray(client.camera, *self._pointers.get(client.client_id, (0.0, 0.0)))
+
     def show(self, frame: Frame, motion: Motion, now: float) -> None:
         """Label the bones of the shown frame below the pointers, at ``now`` s of a steady clock.
 
@@ -82,7 +86,8 @@ def ray(camera: viser.CameraHandle, x: float, y: float) -> tuple[np.ndarray, np.
         x * aspect * right + y * np.cross(right, forward))
 
 
-def bone_at(frame: Frame, origin: np.ndarray, direction: np.ndarray) -> int | None:
+def bone_at(frame: Frame, origin: np.ndarray, direction: np.ndarray,
+            ignored: slice | None = None) -> int | None:
     """Index of the first bone that a ray meets, by the boxes around the bones; None if none."""
     half = np.array([bone.shape.half_extents for bone in frame.scene.bones])
     poses = Pose(frame.state.positions, frame.state.orientations)
@@ -92,5 +97,7 @@ def bone_at(frame: Frame, origin: np.ndarray, direction: np.ndarray) -> int | No
     sides = np.stack([(-half - start) / step, (half - start) / step])
     enters, leaves = sides.min(axis=0).max(axis=1), sides.max(axis=0).min(axis=1)
     enters = np.where((enters <= leaves) & (enters > 0), enters, np.inf)
+    if ignored is not None:
+        enters[ignored] = np.inf
     nearest = int(enters.argmin())
     return nearest if np.isfinite(enters[nearest]) else None

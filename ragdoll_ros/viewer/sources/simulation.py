@@ -16,6 +16,7 @@ import numpy as np
 from ...files.scene import load_scene
 from ...model import errors
 from ...model.push import Push
+from ...model.rotation import IDENTITY
 from ...model.scene import SECOND, Scene
 from ...model.vectors import Vector
 from ...physics.actions.grab import DRAG_TIME
@@ -135,6 +136,10 @@ class SimulationSource(Source):
 
     def let_go(self, hand: str) -> None:
         self._commands.put(lambda: self._simulation.let_go(hand))
+
+    def set_state(self, doll: str, position: Vector, velocity: Vector) -> None:
+        self._commands.put(lambda: self._simulation.set_state(
+            doll, position, IDENTITY, velocity, (0.0, 0.0, 0.0)))
 
     def close(self) -> None:
         self._commands.put(None)

@@ -172,5 +172,10 @@ class Source(Protocol):
     def let_go(self, hand: str) -> None:
         """Release what a hand holds, if anything."""
 
+    def set_state(self, doll: str, position: Vector, velocity: Vector) -> None:
+        """Put a doll's root somewhere, m, with a velocity, m/s, world frame, its axes along the
+        world's; joint angles stay.
+        """
+
     def close(self) -> None:
         """End the threads and release all resources."""

@@ -35,6 +35,7 @@ from .hands import NodeHands
 from .pushes import ForcePublisher, NoInputCounts, ObservedPushes
 from .scene import NodeScene
 from .services import NodeServices, Refused
+from .states import StatePublisher
 
 NAME = 'ragdoll'
 
@@ -76,6 +77,7 @@ class NodeSource(Source):
         self._pushes: ObservedPushes | None = None
         self._inputs: PushSubscriptions | None = None
         self._force = ForcePublisher(self._node, NAME)
+        self._states = StatePublisher(self._node, NAME)
         self._requested = RequestedData()
         self._reported = SourceStatus()
         self._simulated_time = 0.0
@@ -175,6 +177,9 @@ class NodeSource(Source):
 
     def let_go(self, hand: str) -> None:
         self._hands.let_go(hand)
+
+    def set_state(self, doll: str, position: Vector, velocity: Vector) -> None:
+        self._states.send(self._scene.settings.frame_id, doll, position, velocity)
 
     def close(self) -> None:
         self._ended.set()

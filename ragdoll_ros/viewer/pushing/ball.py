@@ -1,0 +1,167 @@
+"""A ball that a page throws at what is under its pointer: a doll of the scene like the others."""
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from ...model.errors import RagdollError
+from ...model.ragdoll import Bone, Ragdoll
+from ...model.scene import Placement, Scene
+from ...model.shapes import Sphere
+from ..sources.source import Frame, Source
+from .hover import Hover, bone_at
+from .motion import Motion, doll_mean
+
+RADIUS = 0.12
+"""m: a medicine ball's."""
+
+MASS = 5.0
+"""kg: with SPEED as much momentum as the tap of an arrow key."""
+
+SPEED = 10.0
+"""m/s towards the target."""
+
+RANGE = 3.0
+"""m from the target at which it is let go, or at the camera where that is nearer."""
+
+NAME = 'ball'
+
+ROLLING_FRICTION = 0.004
+"""m: 3 % of the radius, as of a ball filled with sand: it rolls for some metres."""
+
+BALL = Ragdoll(NAME, (Bone(NAME, Sphere(RADIUS), MASS, (0, 0, 0), color=(0.85, 0.33, 0.1, 1),
+                           rolling_friction=ROLLING_FRICTION),))
+
+HINT = ('At what is clicked; the key T throws it at the pointer. The first time, a ball of '
+        f'{MASS:g} kg is put into the scene, which starts again')
+
+
+class BallThrower:
+    """A checkbox and the key T in the current GUI container; hidden for a recording.
+
+    ``frame`` gives the shown frame, or None where that is in the past; ``refuse`` tells a page so.
+    Where ``is_editing``, clicks select and nothing is thrown.
+    """
+
+    def __init__(self, server: viser.ViserServer, source: Source) -> None:
+        self.frame: Callable[[], Frame | None] = lambda: None
+        self.refuse: Callable[[viser.ClientHandle | None], None] = lambda _: None
+        self.is_editing: Callable[[], bool] = lambda: False
+        self._source = source
+        self._pending: tuple[np.ndarray, np.ndarray] | None = None
+        """Line of sight of a throw that waits for the scene with the ball."""
+        can_throw = source.recording is None
+        self._by_click = server.gui.add_checkbox('Throw a ball by a click', False,
+                                                visible=can_throw, hint=HINT)
+        if can_throw:
+            server.scene.on_click()(self._on_click)
+
+    def add_key(self, server: viser.ViserServer, hover: Hover) -> None:
+        """Let the key T throw at a page's pointer, or at the middle of its picture."""
+        if self._source.recording is not None:
+            return
+        command = server.gui.add_command('Throw a ball', hotkey='T')
+
+        @command.on_trigger
+        async def _(event: viser.CommandEvent) -> None:
+            if event.client is not None:
+                self.throw(event.client, *hover.line_of_sight(event.client))
+
+    @property
+    def takes_clicks(self) -> bool:
+        """Whether a click throws."""
+        return self._by_click.value and not self.is_editing()
+
+    async def _on_click(self, event: viser.SceneClickEvent) -> None:
+        if self.takes_clicks:
+            self.throw(event.client, np.array(event.ray_origin), np.array(event.ray_direction))
+
+    def throw(self, client: viser.ClientHandle, origin: np.ndarray,
+              direction: np.ndarray) -> None:
+        """Throw along a line of sight; to be called in viser's thread. ``origin``, ``direction``
+        (3,), world frame.
+        """
+        if self.is_editing():
+            return
+        frame = self.frame()
+        if frame is None:
+            self.refuse(client)
+        elif has_ball(frame.scene):
+            self._pending = origin, direction
+        elif self._pending is None:
+            self._pending = origin, direction
+            asyncio.get_running_loop().run_in_executor(None, self._add, client, frame.scene)
+
+    def update(self, frame: Frame, motion: Motion) -> None:
+        """Throw what waits; ``motion`` is that of the newest frame."""
+        if self._pending is not None and has_ball(frame.scene):
+            (origin, direction), self._pending = self._pending, None
+            target, velocity = aim(frame, motion, origin, direction)
+            self._source.set_state(NAME, *launch(frame.scene, origin, target, velocity))
+
+    def _add(self, client: viser.ClientHandle, scene: Scene) -> None:
+        try:
+            self._source.set_scene(with_ball(scene))
+        except RagdollError as error:
+            self._pending = None
+            client.add_notification('Refused', str(error), color='red')
+
+
+def has_ball(scene: Scene) -> bool:
+    """Whether there is something to throw."""
+    return any(placement.name == NAME for placement in scene.dolls)
+
+
+def with_ball(scene: Scene) -> Scene:
+    """The scene with a ball at rest, half a metre in front of all dolls (+x), on the ground."""
+    centers = np.array([placement.bone_pose(bone).position for placement in scene.dolls
+                        for bone in placement.doll.bones])
+    reach = max(max(bone.shape.half_extents) for bone in scene.bones)
+    place = centers.mean(axis=0)
+    place[0] = centers[:, 0].max() + reach + RADIUS + 0.5
+    if scene.ground is not None:
+        normal = np.array(scene.ground.normal)
+        place += normal * (scene.ground.offset + RADIUS - place @ normal)
+    ball = Placement(BALL, NAME, tuple(place.tolist()))
+    return dataclasses.replace(scene, dolls=(*scene.dolls, ball))
+
+
+def aim(frame: Frame, motion: Motion, origin: np.ndarray,
+        direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What a line of sight meets, (3,) m, and its velocity (3,) m/s, world frame: a bone, else the
+    ground, else the point at the distance of the first doll. The ball itself is looked through.
+    """
+    unit = direction / np.linalg.norm(direction)
+    names = [placement.name for placement in frame.scene.dolls]
+    ball = frame.scene.bone_slices[names.index(NAME)]
+    bone = bone_at(frame, origin, unit, ignored=ball)
+    if bone is not None:
+        depth = (frame.state.positions[bone] - origin) @ unit
+        velocity = motion.velocities()[bone] if motion.frame is frame else np.zeros(3)
+        return origin + depth * unit, velocity
+    ground = frame.scene.ground
+    if ground is not None:
+        normal = np.array(ground.normal)
+        height, sinks = origin @ normal - ground.offset, -(unit @ normal)
+        if height > 0 and sinks > 1e-6:
+            return origin + height / sinks * unit, np.zeros(3)
+    depth = (doll_mean(frame.scene, 0, frame.state.positions) - origin) @ unit
+    return origin + max(depth, RANGE) * unit, np.zeros(3)
+
+
+def launch(scene: Scene, origin: np.ndarray, target: np.ndarray, velocity: np.ndarray
+           ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Position (3,) m and velocity (3,) m/s with which a ball meets ``target`` (3,) m, which moves
+    with ``velocity`` (3,) m/s and does not fall: x = x0 + v t + g t^2 / 2 with t = distance / SPEED.
+    """
+    way = target - origin
+    distance = max(float(np.linalg.norm(way)), 1e-6)
+    length = min(distance, RANGE)
+    start = target - way * (length / distance)
+    time = max(length, RADIUS) / SPEED
+    speed = (target - start) / time + velocity - np.array(scene.gravity) * time / 2
+    return tuple(start.tolist()), tuple(speed.tolist())
