@@ -114,7 +114,7 @@ def test_what_is_too_fast_is_clamped(node):
 def test_the_line_in_the_reference_is_understood(node):
     """`ros2 topic pub` of docs/reference.md: the YAML that it gives is a message."""
     text = (Path(__file__).parent.parent / 'docs/reference.md').read_text()
-    block = re.search(r'pub --once /ragdoll/set_state (\S+) "([^"]*)"', text)
+    block = re.search(r"pub --once /ragdoll/set_state (\S+) \\\s+'([^']*)'", text)
     assert block[1] == 'nav_msgs/msg/Odometry'
     message = odometry(position=(0, 0, 0))
     fill(message, yaml.safe_load(block[2]))
