@@ -20,7 +20,7 @@ from .accuracy import Accuracy, resolve_accuracy
 from .actions.grab import DRAG_TIME, Grab, Hands, checked_point
 from .actions.joint_springs import JointSpring, JointSprings
 from .actions.push_queue import PushQueue
-from .engine.protocol import Contacts, Engine, Springs
+from .engine.protocol import Contacts, Drives, Engine, Springs, Wrenches
 from .engine.registry import resolve_engine
 from .rigid_body import GroundHeights, JointGap
 from .sleeping import SleepDetector
@@ -323,11 +323,12 @@ class Simulation:
             if self.asleep and not self._pushes and not self._springs:
                 self.time = end
             while self.time < end:
-                change = self._pushes.next_change(self.time)
+                change = self._pushes.next_change(self.time) if self._pushes else None
                 self._advance_until(end if change is None else min(end, change))
             substates.append(self.state)
         self.substates = tuple(substates)
-        self._pushes.drop_ended(self.time)
+        if self._pushes:
+            self._pushes.drop_ended(self.time)
         self._put_to_sleep()
         if self._swings:
             self._swings.advance(self.time, self.state)
@@ -463,8 +464,10 @@ class Simulation:
 
     def _advance_until(self, end: int) -> None:
         """Integrate until ``end``, ns; no push begins or ends before."""
-        loads = (self._pushes.wrenches(self.time, self.state), self._springs,
-                 self._pushes.drives(self.time))
+        loads: tuple[Wrenches, Springs, Drives] = (), self._springs, ()
+        if self._pushes:
+            loads = (self._pushes.wrenches(self.time, self.state), loads[1],
+                     self._pushes.drives(self.time))
         if any(loads):
             self.asleep = False
         if not self.asleep:
@@ -475,10 +478,11 @@ class Simulation:
 
     def _put_to_sleep(self) -> None:
         """Put clusters to sleep that have been still for long enough and rest on the ground."""
-        if self.asleep or not self.accuracy.sleep:
+        detector = self._sleep_detector
+        if self.asleep or not self.accuracy.sleep or detector.all_move(self._engine):
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs))
-        dolls = self._sleep_detector.find_ready(self._engine, self.tick, loaded)
+        dolls = detector.find_ready(self._engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs
             return
         if self._engine.simulates_copies:
@@ -514,7 +518,7 @@ class Simulation:
     @property
     def _springs(self) -> Springs:
         """Springs of hands and of joint angles."""
-        return (*self._hands.springs, *self._joint_springs.springs)
+        return self._hands.springs + self._joint_springs.springs
 
 
 class _ClosedEngine:

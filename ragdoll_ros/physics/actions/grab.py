@@ -100,7 +100,9 @@ class Hands:
 
     def move(self, duration: float) -> None:
         """Advance the hands' positions by ``duration`` s."""
-        self._springs = {name: spring.after(duration) for name, spring in self._springs.items()}
+        if self._springs:
+            self._springs = {name: spring.after(duration)
+                             for name, spring in self._springs.items()}
 
 
 def checked_point(name: str, values: Sequence[float]) -> Vector:

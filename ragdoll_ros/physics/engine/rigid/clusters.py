@@ -83,6 +83,8 @@ class Clusters:
         whole = self._states.arrays
         self.q, self.v, self.bone_states = whole['q'], whole['v'], whole['bone_states'].reshape(
             -1, 13)
+        self.sum_rows = whole['doll_sums'].view(float).reshape(-1, 20)
+        """(d, 20): the sums as DollTotals has them."""
         self.sums, self.stats = whole['doll_sums'], whole['stats']
         """The statistics of a cluster of several dolls are stored at its first doll."""
         first = STEP_STATS.fields['work_pushes'][1] // STEP_STATS.fields['work_grabs'][0].itemsize
@@ -150,7 +152,7 @@ class Clusters:
                 whole[place] = False
             elif cluster.islands:
                 _invalidate(cluster)
-        if not whole.all():
+        if np.count_nonzero(whole) < len(whole):  # a third of what all() costs
             jobs = jobs[:, whole]
         if self._workers == 1 or jobs.shape[1] < 2:
             kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)

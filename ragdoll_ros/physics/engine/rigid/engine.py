@@ -255,7 +255,7 @@ class RigidEngine:
     def _update_state(self) -> None:
         """Copy state and sums from the clusters."""
         self._state = State.of(self._clusters.bone_states.copy())
-        self._doll_totals = DollTotals.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
+        self._doll_totals = DollTotals.of(self._clusters.sum_rows.copy())
 
     def _apply_actions(self, actions: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
         """Set loads and springs of the clusters that ``actions`` act on; returns these clusters."""
