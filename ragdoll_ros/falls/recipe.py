@@ -13,7 +13,7 @@ import numpy as np
 from ..files import yaml_text
 from ..files.config import find
 from ..files.doll import build_doll, doll_data
-from ..files.schema import read_by_name, schema_errors, value_or_raise
+from ..files.schema import is_marked, read_by_name, schema_errors, value_or_raise
 from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
@@ -127,7 +127,7 @@ def recipe_of(data: dict) -> Recipe:
 def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelError]]:
     """Make a recipe from the data of the YAML file at ``path``: it, or None and every error."""
     found = schema_errors('recipe', data)
-    if not isinstance(data, dict):
+    if not is_marked('recipe', data):
         return None, found
     dolls, more = _dolls(data, path)
     found += more

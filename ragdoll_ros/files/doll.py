@@ -13,7 +13,15 @@ from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Part, Shape
 from ..model.swing import Link, Swing, strand
 from . import yaml_text
-from .schema import Made, build_each, entries, read_by_name, schema_errors, value_or_raise
+from .schema import (
+    Made,
+    build_each,
+    entries,
+    is_marked,
+    read_by_name,
+    schema_errors,
+    value_or_raise,
+)
 
 LARGEST_MASS_RATIO = 1e8
 """Largest ratio of two masses in a file. Robots have up to 6.1e7; at 2e8 a tick takes a second, as
@@ -63,7 +71,7 @@ def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
 def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None, list[ModelError]]:
     """Build a doll from the data of the YAML file at ``path``; else None and every error."""
     found = schema_errors('doll', data)
-    if not isinstance(data, dict):
+    if not is_marked('doll', data):
         return None, found
     bones = build_each(data, 'bones', _bone, found)
     joints = build_each(data, 'joints', _joint, found)

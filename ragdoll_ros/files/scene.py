@@ -17,7 +17,14 @@ from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
 from .doll import build_doll, doll_data
-from .schema import has_error_under, read_by_name, schema_errors, try_build, value_or_raise
+from .schema import (
+    has_error_under,
+    is_marked,
+    read_by_name,
+    schema_errors,
+    try_build,
+    value_or_raise,
+)
 
 MOST_DOLLS = 1000
 
@@ -70,7 +77,7 @@ def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
 def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError]]:
     """Build a scene from the data of a scene's file; else None and every error."""
     found = schema_errors('scene', data)
-    if not isinstance(data, dict):
+    if not is_marked('scene', data):
         return None, found
     placements: list[Any] = []
     entries = data.get('dolls')

@@ -18,8 +18,24 @@ _NAMED = {'exclusiveMinimum': errors.NotPositive, 'minimum': errors.OutOfRange,
 Made = TypeVar('Made')
 
 
+MARKS = {'scene': 'dolls', 'doll': 'bones', 'recipe': 'who'}
+"""The key without which a file is none of the kind. Its values then are in no error: whoever may
+set a node's scene could read any file by them."""
+
+
+def is_marked(schema: str, data: object) -> bool:
+    """Whether data may be meant as a scene, a doll or a recipe of falls."""
+    return isinstance(data, dict) and MARKS[schema] in data
+
+
 def schema_errors(schema: str, data: object) -> list[ModelError]:
-    """All violations of the schema ``schema`` ('scene' or 'doll')."""
+    """All violations of the schema ``schema``, a key of MARKS."""
+    if not is_marked(schema, data):
+        form = 'a mapping' if isinstance(data, dict) else 'no mapping'
+        others = [other for other in MARKS if is_marked(other, data)]
+        is_other = f', but a {others[0]}' if others else ''
+        return [errors.WrongForm('', f'{form} without {MARKS[schema]}{is_other}',
+                                 f'a {schema}, which has {MARKS[schema]}')]
     found = []
     for error in _validator(schema).iter_errors(data):
         if error.validator == 'oneOf' and not isinstance(error.instance, dict):

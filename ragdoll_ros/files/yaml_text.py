@@ -30,6 +30,11 @@ _Loader.add_implicit_resolver(
     list('-+0123456789'))
 
 
+OURS = re.compile(r'^(dolls|bones|who):', re.MULTILINE)
+"""Found in every scene, doll and recipe: text without it may be a secret, and is in no error."""
+
+A_SCENE = 'a scene or a doll in YAML'
+
 CHARACTERS = ('.glb', '.gltf', '.vrm', '.urdf', '.xacro')
 """Suffixes of files from which `ragdoll_fit` makes dolls."""
 
@@ -72,12 +77,18 @@ def parse(content: bytes) -> object:
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
         where = _place(mark) if mark else ''
+        if not OURS.search(text):
+            raise errors.Unreadable(where, 'text that is no YAML', A_SCENE) from None
         line = text.splitlines()[mark.line:][:1] if mark else []
         problem = getattr(error, 'problem', None) or getattr(error, 'reason', None)
         raise errors.Unreadable(where, ''.join(line).strip(),
                                 'YAML' + (f' ({problem})' if problem else '')) from None
-    except (ValueError, RecursionError) as error:
-        raise errors.Unreadable('', str(error), 'a YAML file in UTF-8') from None
+    except UnicodeDecodeError as error:
+        raise errors.Unreadable('', f'byte {error.start} of {len(content)}',
+                                'a YAML file in UTF-8') from None
+    except (ValueError, RecursionError, AttributeError) as error:  # the last: for !!timestamp
+        raise errors.Unreadable('', str(error) if OURS.search(text) else 'a wrong value',
+                                A_SCENE) from None
 
 
 def _construct(text: str) -> object:
