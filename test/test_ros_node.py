@@ -29,6 +29,9 @@ from ragdoll_ros.ros.node import RagdollNode
 SECOND = 1_000_000_000
 POSES, MARKERS = '/ragdoll/poses', '/ragdoll/markers'
 
+LATE = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Of a subscriber that wants what was published before it came."""
+
 
 def digest(states):
     """SHA-256 of all numbers of all states."""
@@ -332,3 +335,48 @@ def test_calls_are_answered_by_a_node_that_falls_behind(make_node, peer):
     node = make_node(rate=5000.0, real_time_factor=100.0)
     peer.executor_.add_node(node)
     assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True)).success
+
+
+@pytest.mark.parametrize('kind, topic', [(PoseArray, 'ragdoll/poses'),
+                                         (MarkerArray, 'ragdoll/markers'),
+                                         (DiagnosticArray, 'ragdoll/measures')])
+def test_who_comes_late_gets_the_present(make_node, peer, kind, topic):
+    """Not what was when somebody listened last, or what was while it was paused."""
+    node = make_node()
+    name = f'/{topic}'
+
+    def publisher():
+        found, = (each for each in node.publishers if each.topic_name == name)
+        return found
+
+    def heard_from_now():
+        got = peer.collect(kind, topic, LATE)
+        peer.wait(lambda: publisher().get_subscription_count())
+        return got
+
+    def leave():
+        peer.destroy_subscription(list(peer.subscriptions)[-1])
+        peer.wait(lambda: not publisher().get_subscription_count())
+
+    def first_stamp(got):
+        peer.wait(lambda: got)
+        message = got[0][1]
+        return stamp_of(message.markers[-1] if kind is MarkerArray else message)
+
+    first = heard_from_now()
+    for _ in range(20):
+        node.tick()
+    assert first_stamp(first) <= node.stamp
+    leave()
+    for before in (lambda: None, lambda: (node.pause(True), node.pause(False))):
+        before()
+        for _ in range(5):
+            node.tick()
+        since = node.stamp
+        late = heard_from_now()
+        node._outputs._next_markers = 0  # markers are drawn 30 times a second
+        node.tick()
+        assert first_stamp(late) > since
+        leave()
+    node.pause(True)
+    assert first_stamp(heard_from_now()) == node.stamp

@@ -17,6 +17,7 @@ from visualization_msgs.msg import MarkerArray
 
 from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
+from .late_topic import LATCHED_HISTORY, LateTopic
 from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
 from .messages.measures import TickMeasures, checksum, serialize_measures
 from .messages.serialized import serialize_pose_array
@@ -31,24 +32,21 @@ MARKER_PERIOD = 33_000_000
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
-LATCHED_HISTORY = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""For topics that are silent while paused: late subscribers get the last messages."""
-
 
 class Outputs:
     """The publishers of a node, and the templates of their messages."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._poses = node.create_publisher(PoseArray, '~/poses', LATCHED_HISTORY)
+        self._poses = LateTopic(node, PoseArray, '~/poses')
         self._state = node.create_publisher(MultiDOFJointState, '~/state', 10)
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
-        self._measures = node.create_publisher(DiagnosticArray, '~/measures', LATCHED_HISTORY)
+        self._measures = LateTopic(node, DiagnosticArray, '~/measures')
         self._run: tuple[Simulation | None, int, int] = (None, 0, 0)
         """The simulation that was published last, its reset_count, and the number of that run."""
-        self._swings: Publisher | None = None
+        self._swings: LateTopic | None = None
         self._contacts = node.create_publisher(PoseArray, '~/contacts', 10)
-        self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED_HISTORY)
+        self._markers = LateTopic(node, MarkerArray, '~/markers')
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._tf = TfPublisher(node)
         self._clock: Publisher | None = None
@@ -68,10 +66,11 @@ class Outputs:
     @property
     def has_subscribers(self) -> bool:
         """Whether a topic that is published with each tick has a subscriber."""
-        topics = (self._measures, self._poses, self._state, self._joints, self._contacts,
-                  self._swings)
-        return self._clock is not None or self._tf.has_subscribers or any(
-            topic is not None and topic.get_subscription_count() for topic in topics)
+        return (self._clock is not None or self._tf.has_subscribers
+                or any(topic is not None and topic.has_subscribers
+                       for topic in (self._measures, self._poses, self._swings))
+                or any(topic.get_subscription_count()
+                       for topic in (self._state, self._joints, self._contacts)))
 
     def publish(self, simulation: Simulation, stamp: int, now: int, paused: bool = False) -> None:
         """Publish the simulation's state with ``stamp``, ns, on topics with subscribers, markers at
@@ -93,16 +92,19 @@ class Outputs:
         if self._contacts.get_subscription_count():
             self._contacts.publish(serialize_pose_array(self._frame, stamp,
                                                         contact_poses(simulation.contacts)))
-        if paused or (now >= self._next_markers and self._markers.get_subscription_count()):
+        if not (paused or self._markers.has_subscribers):
+            self._markers.forget()
+        elif paused or now >= self._next_markers:
             self._next_markers = now + MARKER_PERIOD
             self._publish_markers(simulation, stamp)
         self._pending = []
-        for publisher, publish in ((self._measures, self._publish_measures),
+        for topic, publish in ((self._measures, self._publish_measures),
                                    (self._swings, self._publish_swings),
                                    (self._poses, self._publish_poses)):
-            if publisher is not None and (paused or publisher.get_subscription_count()):
+            if topic is not None and (paused or topic.has_subscribers):
                 publish(simulation, stamp)
-            elif publisher is not None:
+            elif topic is not None:
+                topic.forget()
                 self._pending.append(publish)
 
     def publish_on_pause(self, simulation: Simulation, stamp: int) -> None:
@@ -147,9 +149,9 @@ class Outputs:
     def _set_swings_publisher(self, enabled: bool) -> None:
         """Create or destroy the publisher of ~/swings: a scene without swings has no such topic."""
         if enabled and self._swings is None:
-            self._swings = self._node.create_publisher(PoseArray, '~/swings', LATCHED_HISTORY)
+            self._swings = LateTopic(self._node, PoseArray, '~/swings')
         elif not enabled and self._swings is not None:
-            self._node.destroy_publisher(self._swings)
+            self._swings.destroy()
             self._swings = None
 
     def set_clock_publisher(self, enabled: bool) -> None:

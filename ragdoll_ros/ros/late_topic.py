@@ -1,0 +1,47 @@
+"""A topic whose late subscribers get the last messages, as far as they are of the present."""
+from __future__ import annotations
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+LATCHED_HISTORY = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For topics that are silent while paused: late subscribers get the last messages. Fewer could be
+lost on their way, as a message that is not yet acknowledged makes room for a new one."""
+
+
+class LateTopic:
+    """Publishes ``kind`` on ``name`` while there are subscribers.
+
+    What was published before they left would be old for the next one: it is forgotten.
+    """
+
+    def __init__(self, node: Node, kind: type, name: str) -> None:
+        self._node, self._kind, self._name = node, kind, name
+        self._has_history = False
+        self._publisher = self._made()
+
+    @property
+    def has_subscribers(self) -> bool:
+        """Whether anybody listens."""
+        return self._publisher.get_subscription_count() > 0
+
+    def publish(self, message: object) -> None:
+        """Publish a message, also for those who come later; serialized or not."""
+        self._has_history = True
+        self._publisher.publish(message)
+
+    def forget(self) -> None:
+        """Forget past messages: there is a newer state, which is not published."""
+        if self._has_history:
+            self._has_history = False
+            # A writer's history cannot be emptied otherwise.
+            self._node.destroy_publisher(self._publisher)
+            self._publisher = self._made()
+
+    def destroy(self) -> None:
+        """End the topic."""
+        self._node.destroy_publisher(self._publisher)
+
+    def _made(self) -> Publisher:
+        return self._node.create_publisher(self._kind, self._name, LATCHED_HISTORY)
