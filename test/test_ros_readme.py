@@ -80,7 +80,8 @@ def test_table_has_all_topics_and_services_of_the_node(make_node):
     told = {('/' + name.strip('`').replace('~', 'ragdoll').replace('<bone>', 'head').lstrip('/'),
              way, kind)
             for name, way, kind, *_ in table('Topics and services')}
-    own = re.compile('/ragdoll/(describe|get|list|set)_|/(rosout|parameter_events)$')
+    own = re.compile('/ragdoll/(describe|get|list|set)_(parameter|type_description)|'
+                     '/(rosout|parameter_events)$')
     offered = {row for row in directions(make_node(publish_clock=True, scene='ponytail',
                                                     imus=['head']))
                if not own.search(row[0])}

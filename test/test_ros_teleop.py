@@ -82,6 +82,7 @@ def test_a_key_that_a_terminal_repeats_pushes_without_a_gap(peer):
             peer.executor_.spin_once(timeout_sec=1 / 30)
         peer.wait(lambda: got and got[-1][1] == Wrench())
         return len(got) > 20 and set(forces(got)[:-1]) == {(-2000.0, 0.0, 1.0)}
+    # No node: its doll's speed is not known, and not limited.
     peer.wait(held)
 
 
@@ -113,6 +114,44 @@ def test_a_tap_gives_a_metre_a_second_to_a_node_of_any_name(peer, where):
     peer.wait(tapped)
     assert end(process, signal.SIGINT)[0] == 0
     kill(node)
+
+
+def held_for(screen, peer, key, states, seconds):
+    """Repeat a key as a terminal does, for s of the node's clock; the last state."""
+    begin = stamp(states[-1][1])
+    while stamp(states[-1][1]) < begin + seconds:
+        screen.type(key)
+        screen.read()
+        peer.executor_.spin_once(timeout_sec=1 / 60)
+    return states[-1][1]
+
+
+def test_a_held_key_goes_to_the_top_speed_and_not_beyond(peer):
+    """5 s in free space, where 2000 N would make 180 m/s of it. + and - change the speed."""
+    node = start('node', '--ros-args', '-r', '__node:=runner', '-p', 'scene:=flight')
+    states = peer.collect(MultiDOFJointState, '/runner/state')
+    peer.wait(lambda: states)
+    process, terminal = start_on_terminal('teleop.teleop', '/runner', '--top-speed', '2')
+    screen = Screen(terminal)
+    screen.wait(r'RTF \d')
+    assert 1.5 < centre_speed(held_for(screen, peer, b'\x1b[A', states, 5.0)) < 2.5
+    screen.type(b'+++')
+    screen.wait('top speed 3.5 m/s')
+    assert 2.8 < centre_speed(held_for(screen, peer, b'\x1b[A', states, 5.0)) < 4.0
+    assert end(process, signal.SIGINT)[0] == 0
+    process, terminal = start_on_terminal('teleop.teleop', '/runner', '--force')
+    screen = Screen(terminal)
+    screen.wait(r'RTF \d')
+    # The node may find this teleop late.
+    peer.wait(lambda: centre_speed(held_for(screen, peer, b'\x1b[B', states, 0.5)) > 10)
+    assert end(process, signal.SIGINT)[0] == 0
+    kill(node)
+
+
+def test_a_top_speed_out_of_range_is_refused(peer):
+    process, _ = start_on_terminal('teleop.teleop', '--top-speed', '90')
+    _, said = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2 and '--top-speed 90: expected 0.5 to 20' in said
 
 
 def test_of_several_nodes_a_user_says_which(peer):

@@ -77,6 +77,11 @@ class HeldKeys:
         self._until = now + (self.tap if not self._is_held else RELEASE_TIMEOUT
                              if self._has_releases else REPEAT_PERIOD)
 
+    @property
+    def is_held(self) -> bool:
+        """Whether the last key repeats, so that it is no tap."""
+        return self._is_held
+
     def active(self, now: float) -> list[str]:
         """Keys that push."""
         return list(self._keys) if self.remaining(now) > 0 else []

@@ -19,8 +19,8 @@ class StatusLine:
     def __init__(self, node: Node, name: str) -> None:
         self._status_name = status_name(*name.rsplit('/', 1))
         self._values: dict[str, str] = {}
-        self._state: MultiDOFJointState | None = None
-        self._time = 0.0
+        self.state: MultiDOFJointState | None = None
+        self.time = 0.0
         """Simulated time, s."""
         self.subscriptions = [
             node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10),
@@ -40,16 +40,16 @@ class StatusLine:
 
     def text(self, push: str = '') -> str:
         """Real-time factor, time, push, tick cost and root; without a push it fits 80 columns."""
-        if self._state is None or not self._values:
+        if self.state is None or not self._values:
             return 'waiting for the node'
         values = self._values
         factor = 'paused' if self.paused else f'RTF {float(values["pace"]):.2f}'
-        return '  '.join((factor, f'{self._time:.1f} s', f'push {push or values["push"]}',
+        return '  '.join((factor, f'{self.time:.1f} s', f'push {push or values["push"]}',
                           f'tick {float(values["tick_cost_ms"]):.2f} ms', self._root()))
 
     def _root(self) -> str:
-        name, velocity = self._state.joint_names[0], self._state.twist[0].linear
-        position = self._state.transforms[0].translation
+        name, velocity = self.state.joint_names[0], self.state.twist[0].linear
+        position = self.state.transforms[0].translation
         speed = math.hypot(velocity.x, velocity.y, velocity.z)
         return f'{name} {position.x:.2f} {position.y:.2f} {position.z:.2f} m {speed:.1f} m/s'
 
@@ -60,7 +60,7 @@ class StatusLine:
 
     def _on_measures(self, data: bytes) -> None:
         with contextlib.suppress(ValueError):
-            self._time = deserialize_measures(data)[1].time / SECOND
+            self.time = deserialize_measures(data)[1].time / SECOND
 
     def _on_state(self, message: MultiDOFJointState) -> None:
-        self._state = message
+        self.state = message

@@ -1,8 +1,9 @@
 """Keyboard teleoperation: Up pushes the doll away from you, Down toward you, Left and Right.
 
-You look at the doll's face, from +x along -x. A push is 2000 N: a tap gives the doll about 1 m/s, a
-held key keeps pushing, and pushes of several keys add up. Space pauses and resumes, r resets, q
-quits.
+You look at the doll's face, from +x along -x. A push is 2000 N: a tap gives the doll about 1 m/s. A
+held key brings the doll to a top speed, 3 m/s by default, which + and - change; with --force, and in
+the scene `article`, it pushes with 2000 N until its release. Pushes of several keys add up. Space
+pauses and resumes, r resets, q quits.
 """
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable
 
+import numpy as np
 import rclpy
 from geometry_msgs.msg import Vector3, Wrench
 from rclpy.exceptions import InvalidTopicNameException
@@ -21,8 +23,11 @@ from rclpy.utilities import remove_ros_args
 from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import SetBool, Trigger
 
+from ...model.vectors import Vector
 from ...realtime.arrow_keys import DIRECTIONS, TAP, HeldKeys, total_force
+from ...realtime.speed_limit import RESPONSE_TIME, SpeedLimit
 from ..process.rclpy_context import rclpy_context
+from .doll_motion import DollMotion
 from .status_line import StatusLine
 from .terminal_keys import Keyboard
 
@@ -41,11 +46,18 @@ GRAPH_PERIOD = 0.5
 TOPIC_TYPES = {'/poses': 'geometry_msgs/msg/PoseArray', '/force': 'geometry_msgs/msg/Wrench'}
 """Topics by which a ragdoll node is recognized, relative to its name."""
 
-HELP = 'arrows push: tap or hold | space pauses | r resets | q quits'
+TOP_SPEED, TOP_SPEEDS, SPEED_STEP = 3.0, (0.5, 20.0), 0.5
+"""m/s that a held key brings the doll to: by default a run; the range; the step of + and -."""
+
+ARTICLE = 'article'
+"""Name of the scene in which a held key pushes with its whole force, as in the article."""
+
+HELP = 'arrows push: tap or hold | + - top speed | space pauses | r resets | q quits'
 
 EXAMPLE = """examples:
   ragdoll_teleop
   ragdoll_teleop /stage/doll
+  ragdoll_teleop --top-speed 1.5
   ragdoll_teleop --ros-args -r __ns:=/stage
 """
 
@@ -92,10 +104,16 @@ class NodeFinder:
 
 
 class Teleop(Node):
-    """Publishes pushes to a ragdoll node and calls its services; ``requested``: see NodeFinder."""
+    """Publishes pushes to a ragdoll node and calls its services; ``requested``: see NodeFinder.
 
-    def __init__(self, requested: str = '') -> None:
+    ``top_speed``: m/s that a held key brings the doll to; None: it always pushes with its force.
+    """
+
+    def __init__(self, requested: str = '', top_speed: float | None = TOP_SPEED) -> None:
         super().__init__('ragdoll_teleop')
+        self.top_speed, self._limit = top_speed, SpeedLimit(2 * PERIOD)
+        self._news = ''
+        """What the next status line tells besides."""
         self._finder = NodeFinder(self, requested)
         self.held_keys = HeldKeys()
         self._pushing = False
@@ -104,7 +122,7 @@ class Teleop(Node):
     def update_node(self) -> None:
         """Connect to another node if the current one is gone."""
         if self._finder.update():
-            for subscription in self.status.subscriptions:
+            for subscription in (*self.status.subscriptions, self._motion.subscription):
                 self.destroy_subscription(subscription)
             self.destroy_publisher(self._force)
             for client in (self._reset, self._pause):
@@ -118,7 +136,12 @@ class Teleop(Node):
             self.held_keys.on_key(key, down, now)
         elif key == ' ':
             self._pause.call_async(SetBool.Request(data=not self.status.paused))
+        elif key in '+-' and self.top_speed is not None:
+            step = SPEED_STEP if key == '+' else -SPEED_STEP
+            self.top_speed = min(max(self.top_speed + step, TOP_SPEEDS[0]), TOP_SPEEDS[1])
+            self._news = f'top speed {self.top_speed:g} m/s'
         elif key in 'rR':
+            self._limit.clear()
             self._reset.call_async(Trigger.Request())
         return key not in 'qQ'
 
@@ -133,11 +156,25 @@ class Teleop(Node):
         """Publish the force of the active keys, and zero once after them. Returns it as text."""
         keys = self.held_keys.active(now)
         force = total_force(keys)
+        if self.held_keys.is_held:
+            force = self._limited(force)
         if keys or self._pushing:
             x, y, z = force
             self._force.publish(Wrench(force=Vector3(x=x, y=y, z=z)))
         self._pushing = bool(keys)
-        return f'({force[0]:g} {force[1]:g} {force[2]:g}) N' if keys else ''
+        return '({} {} {}) N'.format(*map(round, force)) if keys else ''
+
+    def _limited(self, force: Vector) -> Vector:
+        """The part of a held key's force (3,) N that brings the doll to the top speed."""
+        motion, length = self._motion, float(np.linalg.norm(force))
+        if self.top_speed is None or not length or not motion.mass or motion.scene == ARTICLE:
+            return force
+        unit, time = np.array(force) / length, self.status.time
+        left = self._limit.impulse(unit, self.top_speed - motion.speed(unit), motion.mass, time)
+        limited = min(length, left / RESPONSE_TIME) * unit
+        if not self.status.paused:
+            self._limit.sent(limited, time, self.status.real_time_factor)
+        return tuple(limited.tolist())
 
     def next_publish(self, now: float) -> float:
         """Time until the next force is due, s."""
@@ -145,11 +182,13 @@ class Teleop(Node):
 
     def status_text(self, push: str) -> str:
         """The status line with the active push, or why no node can be chosen."""
-        return self._finder.problem or self.status.text(push)
+        news, self._news = self._news, ''
+        return self._finder.problem or self.status.text(news or push)
 
     def _connect(self, name: str) -> None:
         """Create publishers and clients for the node of a fully qualified name."""
         self.status = StatusLine(self, name)
+        self._motion = DollMotion(self, name, lambda: self.status.state)
         self._force = self.create_publisher(Wrench, f'{name}/force', 10)
         self._reset = self.create_client(Trigger, f'{name}/reset')
         self._pause = self.create_client(SetBool, f'{name}/pause')
@@ -201,13 +240,20 @@ def main(arguments: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('node', nargs='?', default='',
                         help='name of the node (default: ragdoll, or the only ragdoll node)')
-    requested = parser.parse_args(remove_ros_args(arguments)[1:]).node
+    parser.add_argument('--top-speed', type=float, default=TOP_SPEED, metavar='M_S',
+                        help=f'm/s that a held key brings the doll to ({TOP_SPEED:g})')
+    parser.add_argument('--force', action='store_true',
+                        help='a held key pushes with 2000 N until its release, to any speed')
+    options = parser.parse_args(remove_ros_args(arguments)[1:])
+    lowest, highest = TOP_SPEEDS
+    if not lowest <= options.top_speed <= highest:
+        parser.error(f'--top-speed {options.top_speed:g}: expected {lowest:g} to {highest:g}')
     if not sys.stdin.isatty():
         print('ragdoll_teleop: standard input is not a terminal', file=sys.stderr)
         return 2
     with rclpy_context(arguments):
         try:
-            teleop = Teleop(requested)
+            teleop = Teleop(options.node, None if options.force else options.top_speed)
         except InvalidTopicNameException as error:
             print(f'ragdoll_teleop: {error}', file=sys.stderr)
             return 2

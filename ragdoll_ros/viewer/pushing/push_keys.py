@@ -14,7 +14,7 @@ from ..browser.scripts import add_listener
 from ..sources.source import Frame, Source
 from .directions import seen_from
 from .motion import Motion
-from .speed_limit import RESPONSE_TIME, SpeedLimit
+from ...realtime.speed_limit import RESPONSE_TIME, SpeedLimit
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
 """By the labels of their buttons, short enough for one row."""

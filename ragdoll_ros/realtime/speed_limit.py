@@ -20,10 +20,12 @@ class SpeedLimit:
     """The impulse that a speed leaves.
 
     ``time``: s simulated, of the newest frame. By that clock a push that was sent still takes as
-    long to show where a busy machine delays frames. Not thread-safe.
+    long to show where a busy machine delays frames. ``longest``: s that a push lasts until the next
+    one replaces it. Not thread-safe.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, longest: float = LONGEST) -> None:
+        self._longest = longest
         self._recent: deque[tuple[float, np.ndarray]] = deque()
         """Time until which a push that was sent does not show; its largest impulse, (3,) N s."""
 
@@ -39,7 +41,7 @@ class SpeedLimit:
 
     def sent(self, force: np.ndarray, time: float, real_time_factor: float) -> None:
         """Take note of the force (3,) N of a push that is sent now."""
-        self._recent.append((time + DELAY * real_time_factor, force * LONGEST))
+        self._recent.append((time + DELAY * real_time_factor, force * self._longest))
 
     def clear(self) -> None:
         """Forget all pushes, as at a reset."""

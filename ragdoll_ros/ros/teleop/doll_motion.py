@@ -1,0 +1,62 @@
+"""Mass and velocity of the doll that is pushed, from what a node publishes."""
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import MultiDOFJointState
+from std_msgs.msg import String
+
+from ...files.urdf_tree import parse_urdf
+from ...model.errors import RagdollError
+from ..outputs import LATCHED
+
+
+class DollMotion:
+    """The first doll of the node of a fully qualified ``name``, whose root is the pushed bone by
+    default. ``state`` gives the node's last state, or None.
+    """
+
+    def __init__(self, node: Node, name: str,
+                 state: Callable[[], MultiDOFJointState | None]) -> None:
+        self._state = state
+        self._masses: dict[str, float] = {}
+        self.scene = ''
+        """Name of the scene; empty if it is not known."""
+        namespace = name.rsplit('/', 1)[0]
+        self.subscription = node.create_subscription(
+            String, f'{namespace}/robot_description', self._take, LATCHED)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the doll, kg; 0 if it is not known."""
+        return float(self._rows()[0].sum())
+
+    def speed(self, direction: np.ndarray) -> float:
+        """Speed, m/s, along a unit vector (3,) of the root or of the doll's centre of mass, the
+        larger of both; the doll must have a mass.
+        """
+        masses, velocities = self._rows()
+        speeds = velocities @ direction
+        return float(max(speeds[0], masses @ speeds / masses.sum()))
+
+    def _rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Masses (n,) kg and velocities (n, 3) m/s of the doll's bones, the root first."""
+        state = self._state()
+        if state is None or not state.joint_names:
+            return np.zeros(0), np.zeros((0, 3))
+        first = state.joint_names[0].rpartition('/')[0]
+        own = [k for k, name in enumerate(state.joint_names)
+               if name.rpartition('/')[0] == first and name in self._masses]
+        twists = [state.twist[k].linear for k in own]
+        return (np.array([self._masses[state.joint_names[k]] for k in own]),
+                np.array([(twist.x, twist.y, twist.z) for twist in twists]).reshape(-1, 3))
+
+    def _take(self, message: String) -> None:
+        # A description that cannot be read leaves the masses unknown.
+        with contextlib.suppress(RagdollError):
+            robot = parse_urdf(message.data)
+            self.scene = robot.name
+            self._masses = {name: link.mass for name, link in robot.links.items()}
