@@ -308,3 +308,25 @@ def test_overload_lowers_the_pace_and_stamps_stay_ros_time(make_node, peer):
     assert float(values['lost_time']) > 0 and float(values['stamp_lag_ms']) < 1000
     assert 'below the requested' in reports[-1][1].status[0].message
     assert 'dropped' in reports[-1][1].status[0].message
+
+
+@pytest.mark.parametrize('rate', [20.0, 100.0, 240.0])
+def test_after_stalls_no_stamp_lies_in_the_future(make_node, peer, rate):
+    """Four stalls of more than 0.5 s that end in any phase of a tick; before, after half of them
+    stamps lay up to half a period ahead until the next one.
+    """
+    node, ahead = make_node(scene='flight', rate=rate), []
+    make_tick = node._ticker._tick
+
+    def tick(due):
+        ahead.append(due - time.monotonic_ns())
+        make_tick(due)
+        if len(ahead) % 8 == 0 and len(ahead) <= 32:
+            time.sleep(0.52 + 0.23 * len(ahead) / 8 / rate)  # the stall
+
+    node._ticker._tick = tick
+    peer.executor_.add_node(node)
+    peer.wait(lambda: len(ahead) > 40)
+    # What is due is never early by more than a timer's rounding.
+    assert max(ahead) < 1e6
+    assert node._ticker.dropped_ticks > 0

@@ -135,7 +135,7 @@ class RagdollNode(Node):
             self._imus.publish(self.simulation, self.stamp)
         self._ticker.set_idle(self.simulation.asleep and not (
             self._outputs.has_subscribers or self._imus.has_subscribers))
-        lag = 0.0 if due is None else max(0.0, start - due)
+        lag = 0.0 if due is None else start - due
         self._diagnostics.record_tick(time.monotonic_ns() - start, lag, self.simulation.tick)
 
     def reset(self) -> None:

@@ -111,9 +111,13 @@ class Ticker:
         woken = time.monotonic_ns()
         for throttle in self._throttles.values():
             throttle.wake(woken)
-        end = woken + MAX_CALLBACK_TIME
+        end, dropped = woken + MAX_CALLBACK_TIME, self._pacer.dropped_time
         for _ in range(self._max_ticks):
             now = time.monotonic_ns()
             if now > end or not self._pacer.due(now):
                 break
             self._tick(self._pacer.last_due)
+        if self._pacer.dropped_time != dropped:
+            # Ticks are due in another phase now. The timer would come up to half a period before
+            # them, and stamps would lie in the future.
+            self._timer.reset()
