@@ -108,6 +108,18 @@ def test_islands_of_a_cluster_have_all_their_contacts():
         assert simulation._engine.bones_on_ground().all()
 
 
+def test_a_doll_falls_asleep_as_it_does_alone():
+    """Also where others become still before it: they have no part in when it counts as still."""
+    scene = crowd_digests.sixty()
+    crowd = dataclasses.replace(scene, dolls=scene.dolls[:12])
+    alone = dataclasses.replace(scene, dolls=scene.dolls[:1])
+    with Simulation(crowd) as one, Simulation(alone) as other:
+        while not other.asleep:
+            rows = other.advance().rows
+            assert (one.advance().rows[:len(rows)] == rows).all(), other.time
+        assert one._engine.sleeping[0]
+
+
 @pytest.mark.slow
 def test_sixty_dolls_have_the_same_bits_for_any_workers_after_a_reset_and_alone():
     """As `python -m ragdoll_ros.accuracy.crowds --part digests`, over fewer ticks."""

@@ -126,8 +126,9 @@ class SleepDetector:
         moved = np.maximum(
             np.abs(state.positions - self._since[:, :3]).max(axis=1),
             rotation.angle_between(state.orientations, self._since[:, 3:]) * self._sizes)
-        crept = np.maximum.reduceat(moved, self._first) >= (
-            self._displacement * self._wait / self._time)
+        # Of the ready ones alone: else a doll's timer would depend on when others are ready.
+        crept = ready & (np.maximum.reduceat(moved, self._first) >= (
+            self._displacement * self._wait / self._time))
         faster = ready & (kinetic > self._bound)
         self._bound[faster] = self._grown(kinetic)[faster]
         self._still[crept | faster] = 0

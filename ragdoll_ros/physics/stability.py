@@ -110,9 +110,13 @@ class StabilityTest:
         speeds, exceeded = np.zeros_like(at_rest), np.zeros_like(ended)
         with contextlib.closing(engine.simulate_copy(dolls, velocities, interval)) as energies:
             for k, kinetic in zip(range(SAMPLES + 1), energies, strict=False):
-                now = speeds[k:] = np.sqrt(2 * np.bincount(clusters, kinetic * dolls))
+                # What has ended goes on with the others, but does not count: so a doll's verdict is
+                # the same in a crowd as alone.
+                now = np.where(ended, speeds[k], np.sqrt(2 * np.bincount(clusters, kinetic * dolls)))
+                speeds[k:] = now
                 if k > 1:
-                    exceeded |= (now > GROWTH * (at_rest[k] + speeds[0])) & (now > speeds[k - 1])
+                    exceeded |= ~ended & (now > GROWTH * (at_rest[k] + speeds[0])) & (
+                        now > speeds[k - 1])
                 if k > QUIET_AFTER:
                     ended |= (now < slow) & (now < 1.05 * speeds[k - 2])
                 ended |= exceeded | (now > limit)
