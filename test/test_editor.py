@@ -156,7 +156,7 @@ def test_a_bone_without_a_partner_is_told_as_such(desk):
 
 @pytest.mark.parametrize(('name', 'content', 'words'), [
     ('x.yaml', b'bones: 3', 'bones: expected a list ('),
-    ('x.yaml', b'a: 1\nb: [1, 2\nc: 3\n',
+    ('x.yaml', b'dolls: 1\nb: [1, 2\nc: 3\n',
      "expected YAML (did not find expected ',' or ']'), not c: 3"),
     ('x.glb', b'abc', 'byte 0: expected glTF, as a .glb begins, not abc')])
 def test_what_is_no_file_of_its_kind_is_told_in_words(desk, name, content, words):
@@ -748,7 +748,7 @@ def test_files_are_listed_with_their_dates_and_loaded_from_there(desk):
     desk.files.save()
     first, newest, new, old = desk.files.saved.options
     assert newest.startswith('newest.yaml · 20') and first == desk.files.saved.value
-    assert (new, old) == ('new.yaml · 2025-01-02 12:00', 'old.yaml · 2025-01-01 12:00')
+    assert (new, old) == ('new.yaml · 2025-01-02', 'old.yaml · 2025-01-01')
     desk.files._load_listed(old)
     assert desk.editor.scene == load_scene('crowd') and desk.files.name.value == 'old.yaml'
     assert str(desk.path) in desk.files.place.content

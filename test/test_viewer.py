@@ -451,8 +451,27 @@ def test_contacts_on_demand(page):
     rises = (lines[below, 1, 2] - lines[below, 0, 2]).sum()
     assert rises == pytest.approx(WEIGHT_LENGTH, rel=0.01)
     client.update(page.display.contacts, False)
-    wait(lambda: page.frame.contacts is None)
     wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)
+
+
+def test_who_looks_back_sees_contacts_of_the_time_before_they_were_shown(page):
+    client = page.open()
+    wait(lambda: page.frame and page.frame.time > 2)
+    client.steer(page, 'time 1.8')
+    wait(lambda: page.frame.time < 2)
+    assert page.server.scene.get_handle_by_name('/scene/contacts') is None
+    client.update(page.display.contacts, True)
+    assert len(wait_for(page, '/scene/contacts').points) > 3
+
+
+def test_a_scene_that_is_loaded_while_editing_runs(page):
+    client = page.open()
+    wait(lambda: page.editor)
+    page.editor.toggle()
+    wait(lambda: page.source.status.paused)
+    client.tell(page.gallery.events, 'flight')
+    wait(lambda: page.frame.scene.name == 'flight' and page.frame.time > 0.1)
+    assert not page.editor.editing
 
 
 def test_the_camera_is_told_on_demand_what_to_follow(page):

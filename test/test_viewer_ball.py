@@ -8,7 +8,6 @@ import pytest
 
 pytest.importorskip('viser')
 from page_client import served, wait
-from viser import _messages
 
 from ragdoll_ros import Simulation
 from ragdoll_ros.files.scene import load_scene
@@ -91,52 +90,67 @@ def page():
         yield page
 
 
-def click(client, origin, direction):
-    client.send(_messages.ScenePointerMessage(
-        event_type='click', ray_origin=tuple(map(float, origin)),
-        ray_direction=tuple(map(float, direction)), screen_pos=((0.5, 0.5),), modifier=None))
+def click(page, client, eye, at=(0.0, 0.0, 0.3)):
+    """Look at a point, and click at the middle of the picture."""
+    camera, = (each.camera for each in page.server.get_clients().values())
+    wait(lambda: client.look(eye, at) or tuple(camera.position) == eye)
+    client.tell(page._hover.pointer_events, 'click 0.0 0.0')
 
 
-def ball_of(frame):
-    """Place and velocity of the ball, (3,) each; None without one."""
-    if not has_ball(frame.scene):
-        return None
-    return frame.state.positions[-1], frame.state.linear_velocities[-1]
+@pytest.fixture
+def thrown(page, monkeypatch):
+    """Each throw: position and velocity; as by eye, a fast ball could be missed."""
+    seen, throw = [], page.source.set_state
+
+    def noted(doll, position, velocity):
+        assert doll == NAME
+        seen.append((position, velocity))
+        throw(doll, position, velocity)
+
+    monkeypatch.setattr(page.source, 'set_state', noted)
+    return seen
 
 
-def test_a_click_throws_and_the_doll_is_hit(page):
+def test_a_click_throws(page, thrown):
     """The first throw puts the ball into the scene, which starts again; the next do not."""
     client = page.open()
     wait(lambda: page.frame and page.frame.time > 1.0)
-    click(client, (4, 0, 1), (-1, 0, -0.2))
+    click(page, client, (4.0, 0.0, 1.0))
     first = page.frame.time
     wait(lambda: page.frame.time > first + 0.3)
     assert not has_ball(page.frame.scene)  # not yet: clicks choose what is pushed
     client.update(page.controls.ball._by_click, True)
-    click(client, (4, 0, 1), (-1, 0, -0.2))
-    wait(lambda: ball_of(page.frame) and ball_of(page.frame)[1][0] < -5)
-    assert page.frame.time < 2.0
-    # Over the momentum of the ball alone the doll moves: it was hit.
-    wait(lambda: page.frame.state.linear_velocities[0][0] < -0.2)
+    click(page, client, (4.0, 0.0, 1.0))
+    wait(lambda: thrown)
+    assert has_ball(page.frame.scene) and thrown[0][1][0] < -9
+    # While it is paused the ball waits where it is thrown from.
+    page.source.pause(True)
+    wait(lambda: page.source.status.paused)
     run, time = page.frame.run, page.frame.time
-    click(client, (4, 3, 1), (-1, 0, -0.2))
-    wait(lambda: ball_of(page.frame)[0][1] > 2)
+    click(page, client, (0.0, 4.0, 1.0))
+    wait(lambda: len(thrown) == 2)
+    wait(lambda: page.frame.state.positions[-1][1] == pytest.approx(
+        thrown[1][0][1], abs=1e-6))
+    assert thrown[1][1][1] < -8
     assert page.frame.run == run and page.frame.time >= time
     assert page.controls.pushes.bone == 0
 
 
-def test_the_key_throws_at_the_pointer(page):
+def test_the_key_throws_at_the_pointer(page, thrown):
     """Or at the middle of the picture, where there is no pointer."""
     client = page.open()
     client.look((3.0, 0.0, 1.5), (0.0, 0.0, 0.5))
     wait(lambda: page.frame)
     client.press(page, 'Throw a ball')
-    wait(lambda: ball_of(page.frame) and ball_of(page.frame)[1][0] < -5)
+    wait(lambda: thrown)
     before = page.frame.run
     client.tell(page._hover.pointer_events, '0.9 0.0')
+    wait(lambda: page._hover._pointers)
+    count = len(thrown)
+    client.press(page, 'Throw a ball')
+    wait(lambda: len(thrown) > count)
     # To the right as seen from +x: towards +y.
-    wait(lambda: client.press(page, 'Throw a ball') or ball_of(page.frame)[0][1] > 0.3)
-    assert page.frame.run == before
+    assert thrown[-1][1][1] > 0.3 and page.frame.run == before
 
 
 def test_nothing_is_thrown_while_editing(page):

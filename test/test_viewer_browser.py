@@ -194,7 +194,7 @@ def test_all_of_the_timeline_is_saved(view, states, tmp_path):
     view.wait(lambda: far(view, START, 0.1))
     open_recording(view)
     with view.page.expect_download() as download:
-        view.press('Export')
+        view.press('Export: glTF, BVH, CSV, MCAP')
     download.value.save_as(tmp_path / 'run.zip')
     with zipfile.ZipFile(tmp_path / 'run.zip') as package:
         assert package.namelist() == [f'run{suffix}' for suffix in FORMATS]

@@ -6,15 +6,17 @@ import json
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip('viser')
 from page_client import served, wait
 
 from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model.scene import Ground
 from ragdoll_ros.physics.accuracy import ACCURACIES
 from ragdoll_ros.viewer.health import GRACE, figures, health
-from ragdoll_ros.viewer.settings_panel import ERRORS_MM
+from ragdoll_ros.viewer.settings_panel import ERRORS_MM, sloping, slope_of
 from ragdoll_ros.viewer.sources.simulation import SimulationSource, TickStatistics
 from ragdoll_ros.viewer.sources.source import RequestedData, SourceStatus
 from ragdoll_ros.viewer.widgets.form import AMBER, GREEN, GREY, RED
@@ -47,7 +49,7 @@ WELL = SourceStatus(measured_real_time_factor=0.99, tick_cost=2e-4)
 @pytest.mark.parametrize(('changes', 'color', 'reason'), [
     ({}, GREEN, 'Running'),
     ({'paused': True, 'measured_real_time_factor': 0.1}, GREEN, 'Paused'),
-    ({'measured_real_time_factor': 0.6, 'tick_cost': 0.016}, AMBER, 'Use accuracy draft'),
+    ({'measured_real_time_factor': 0.6, 'tick_cost': 0.016}, AMBER, 'Choose accuracy draft'),
     ({'measured_real_time_factor': 0.6}, AMBER, 'the machine is busy'),
     ({'measures': {'energy_excess_J': 0.0011 * WEIGHT}}, RED, 'Use accuracy exact'),
     ({'measures': {'energy_excess_J': 0.0011 * WEIGHT, 'work_of_pushes_J': WEIGHT}}, GREEN, ''),
@@ -147,10 +149,48 @@ def test_gravity_and_ground_as_typed(page):
     assert scene.ground is None and scene.dolls == DROP.dolls
 
 
+def test_a_slope_falls_towards_the_front_below_the_doll(page):
+    """10 degrees: on ice the doll slides by g sin(10 degrees), towards +x, as closed form."""
+    form = page.settings.form
+    for key, text in (('slope', '10'), ('friction', '0'), ('restitution', '0')):
+        page.client.update(form[key], text)
+    wait(lambda: form['slope'].value == '10' and form['restitution'].value == '0')
+    page.client.update(page.settings.apply, True)
+    wait(lambda: page.frame.scene is not DROP)
+    scene = page.frame.scene
+    angle = math.radians(10)
+    assert scene.ground.normal == pytest.approx((math.sin(angle), 0, math.cos(angle)))
+    middle = np.mean([placement.position for placement in scene.dolls], axis=0)
+    assert scene.ground.normal @ np.array((*middle[:2], 0)) == pytest.approx(scene.ground.offset)
+    masses = np.array([bone.mass for bone in scene.bones])
+
+    def speed(frame):
+        return masses @ frame.state.linear_velocities[:, 0] / masses.sum()
+
+    wait(lambda: page.frame.time > 2.5)
+    first = page.frame
+    wait(lambda: page.frame.time > first.time + 0.5)
+    last = page.frame
+    # Along x; the doll may still roll a little on its way.
+    assert (speed(last) - speed(first)) / (last.time - first.time) == pytest.approx(
+        9.8 * math.sin(angle) * math.cos(angle), rel=0.05)
+
+
+def test_a_ground_keeps_the_direction_in_which_it_falls():
+    """At the same slope it stays as it is, to the bit."""
+    ground = Ground((0.0, 0.2, 1.0), 0.3)
+    scene = dataclasses.replace(DROP, ground=ground)
+    assert sloping(ground, scene, slope_of(ground)) is ground
+    steeper = sloping(ground, scene, 40.0)
+    assert slope_of(steeper) == 40 and steeper.normal[0] == pytest.approx(0, abs=1e-12)
+    assert steeper.normal[1] > 0
+
+
 @pytest.mark.parametrize(('key', 'text', 'word'), [
+    ('slope', '81', 'slope must be 0 to 80 °, not 81'), ('slope', '-5', 'slope must be 0 to 80'),
     ('gravity', '0 0 -1e9', 'gravity must be -1000 to 1000'),
     ('gravity', 'abc', '3 numbers'), ('friction', 'x', 'a number'),
-    ('restitution', '', 'a number'), ('friction', '-1', 'scene friction must be 0 to inf, not -1'),
+    ('restitution', '', 'a number'), ('friction', '-1', 'friction must be 0 to inf, not -1'),
     ('restitution', '1.5', 'restitution must be 0 to 1, not 1.5')])
 def test_what_cannot_be_read_is_said_beside_the_field(page, key, text, word):
     form = page.settings.form

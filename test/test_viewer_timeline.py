@@ -137,6 +137,19 @@ def test_a_playhead_pauses_plays_and_steps(buffer):
     assert playhead.frame(999.0).time == 1.0 and not playhead.is_playing
 
 
+def test_a_replay_that_has_ended_begins_with_the_last_run():
+    """Not with the one before the reset."""
+    buffer = FrameBuffer()
+    for run, ticks in ((0, 50), (1, 30)):
+        for tick in range(ticks):
+            buffer.add(frame(0.01 * tick, run=run))
+    clip = buffer.clip()
+    playhead = Playhead(clip, clip.duration)
+    playhead.toggle(100.0)
+    first = playhead.frame(100.0)
+    assert (first.run, first.time) == (1, 0.0)
+
+
 def drawn(page):
     batches = page.stage.bodies.batches
     return (np.concatenate([batch.handle.batched_positions for batch in batches]),

@@ -28,6 +28,8 @@ class Controls:
         self.source = source
         self.loading = ''
         """Name of the scene that is being loaded; empty if none is."""
+        self.before_load: Callable[[], None] = lambda: None
+        """Called before another scene is loaded."""
         self._shown_engine = ''
         self._shown_scene = OTHER
         self._loop = server.get_event_loop()
@@ -65,6 +67,7 @@ class Controls:
         """Load a scene for a page; to be called in viser's thread."""
         def load() -> None:
             self.loading = name
+            self.before_load()
             try:
                 self.source.load(name)
             finally:

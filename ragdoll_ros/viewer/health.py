@@ -25,8 +25,8 @@ LATE = 0.95
 MAX_ENERGY_GAIN = 1e-3
 """Energy gain that raises a warning, as a fraction of the energy of a fall and the work done."""
 
-SLOW = ('Slower than requested: a tick takes {cost:.1f} ms and one is due every {due:.1f} ms. Use '
-        'accuracy draft, or a lower real-time factor.')
+SLOW = ('Slower than requested: a tick takes {cost:.1f} of {due:.1f} ms. Choose accuracy draft, or a '
+        'lower speed in the bar below.')
 BUSY = 'Slower than requested: the machine is busy with other programs.'
 GAINED = ('Inaccurate: {energy:.3g} J of energy have come from errors of the computation. Use '
           'accuracy exact, or the engine rigid.')
@@ -90,7 +90,7 @@ def figures(status: SourceStatus, scene: Scene) -> str:
         return ''
     cost, due = _cost_and_due(status, scene)
     lines = [f'tick {cost:.2f} of {due:.1f} ms',
-             f'energy error {max(0.0, status.measures.get("energy_excess_J", 0.0)):.2g} J']
+             f'energy excess {max(0.0, status.measures.get("energy_excess_J", 0.0)):.2g} J']
     measured = status.measured_real_time_factor
     if not (status.paused or math.isnan(measured)):
         lines.insert(0, f'real-time factor {measured:.2f} of {status.real_time_factor:g}')
@@ -112,7 +112,8 @@ def _reference_energy(status: SourceStatus, scene: Scene) -> float:
 def _dot(found: Health) -> str:
     """HTML of the dot and its reason, which is read out when it changes."""
     return ('<div role="status" style="font-size: 0.85em; padding: 0 1em 0.4em; '
-            'overflow-wrap: anywhere">'
+            # Two lines: what is below stays where it is.
+            'min-height: 3em; overflow-wrap: anywhere">'
             f'<span aria-hidden="true" style="color: {found.color}">&#9679;</span> '
             f'{html.escape(found.text)}</div>')
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import viser
@@ -61,6 +62,8 @@ class Page:
         """The scene that is shown; None before the first frame."""
         self.start_when_visible: StartWhenVisible | None = None
         self._live: Frame | None = None
+        self._has_contacts = False
+        """Whether contacts are drawn."""
         self._folder = folder
         configure_lights(server)
         configure_theme(server, dark=False)
@@ -94,6 +97,7 @@ class Page:
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
+        self.controls.before_load = self._end_editing
         self.transport.loading = lambda: self.controls.loading
         self.cameras = Cameras(server)
         self._auto_follow = AutoFollow(self.display.follow)
@@ -101,7 +105,7 @@ class Page:
         self.controls.ball.frame = self._grabbable_frame
         self.controls.ball.refuse = self.transport.refuse
         self.controls.ball.is_editing = lambda: self.editor is not None and self.editor.editing
-        self.controls.ball.add_key(server, self._hover)
+        self.controls.ball.connect(server, self._hover)
         self._pointer = Pointer(source, self._grabbable_frame, self._select, self.transport.refuse)
         self.controls.pushes.may_push = lambda: self.timeline.is_live
         self.controls.pushes.refuse = self.transport.refuse
@@ -157,7 +161,9 @@ class Page:
         """Draw the source's newest frame, or the one that the timeline selects."""
         self.plots.show(self.timeline.shown_instant(now), now)
         frame = self.timeline.frame_to_show(live, now)
-        if frame is not self.frame:
+        has_contacts = self.display.contacts.value
+        if frame is not self.frame or has_contacts != self._has_contacts:
+            self._has_contacts = has_contacts
             self._draw(frame)
             if self.timeline.is_live:
                 self.cameras.show(frame)
@@ -198,7 +204,8 @@ class Page:
             self._edit(frame.scene)
         self.frame = frame
         with self.server.atomic():
-            self.stage.show(frame)
+            self.stage.show(frame if self._has_contacts else replace(
+                frame, contacts=None, forces=None, pairs=None))
         # Without it viser collects messages for up to 1/60 s.
         self.server.flush()
 
@@ -211,6 +218,12 @@ class Page:
             self.editor = Editor(self.server, scene, self.source.set_scene, self.source.pause,
                                  self._edit_banner, self._folder)
         self.transport.before_step = self.editor.leave
+
+    def _end_editing(self) -> None:
+        """End editing before another scene is loaded, which then runs."""
+        if self.editor is not None and self.editor.editing:
+            self.editor.leave()
+            self.source.pause(False)
 
     def _show_messages(self, problem: str, note: str) -> None:
         notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 
+import numpy as np
 import viser
 
 from ..model import errors
@@ -24,9 +25,14 @@ ERRORS_MM = {'rigid': {'draft': 0.69, 'normal': 0.38, 'exact': 0.04},
 each engine: docs/accuracy.md, 'pieces'. The finest of PyBullet and MuJoCo there has 32 substeps."""
 
 FIELDS = (
-    Field('gravity', 'gravity, m/s²', 'vector', 'along x, y, z; z is up'),
-    Field('friction', 'scene friction', 'text', 'of bones without their own; inf: no slip'),
-    Field('restitution', 'restitution', 'number', '0: no bounce, 1: full bounce'))
+    Field('gravity', 'Gravity, m/s²', 'vector', 'Along x, y, z; z is up'),
+    Field('friction', 'Friction', 'text', 'Of bones without their own; inf: no slip'),
+    Field('restitution', 'Restitution', 'number', '0: no bounce, 1: full bounce'),
+    Field('slope', 'Slope, °', 'number', 'Of the ground, which falls towards +x, the front of '
+          'the home view; 0: level'))
+
+MAX_SLOPE = 80.0
+"""Degrees: more is no ground to lie on."""
 
 
 class SettingsPanel:
@@ -55,7 +61,8 @@ class SettingsPanel:
         if scene is not self._scene:
             self._scene = scene
             self.form.fill({'gravity': scene.gravity, 'restitution': scene.material.restitution,
-                            'friction': parsing.format_number(scene.material.friction)})
+                            'friction': parsing.format_number(scene.material.friction),
+                            'slope': slope_of(scene.ground or Ground())})
             self.ground.value = scene.ground is not None
         self.health.show(status, scene, now)
         cost = colored(self._cost(status), GREY)
@@ -71,7 +78,7 @@ class SettingsPanel:
         error = ERRORS_MM.get(status.engine_name, {}).get(status.accuracy)
         if error is None or math.isnan(status.tick_cost):
             return ''
-        return (f'A tick takes {1e3 * status.tick_cost:.1f} ms. Typical error: {error:g} mm after '
+        return (f'A tick takes {1e3 * status.tick_cost:.2g} ms. Typical error: {error:g} mm after '
                 '0.1 s of contacts.')
 
     async def _on_accuracy(self, event: viser.GuiEvent) -> None:
@@ -99,6 +106,11 @@ class SettingsPanel:
                 found.append(type(error)(key, error.value, error.expected))
         ground = (scene.ground or Ground()) if self.ground.value else None
         try:
+            if ground is not None and 'slope' in values:
+                ground = sloping(ground, scene, values['slope'])
+        except errors.ModelError as error:
+            found.append(error)
+        try:
             scene = dataclasses.replace(scene, gravity=values.get('gravity', scene.gravity),
                                         material=material, ground=ground)
         except errors.ModelError as error:
@@ -116,3 +128,27 @@ class SettingsPanel:
             text = error_text(error) if isinstance(error, errors.ModelError) else str(error)
             self.message.content = colored(text, RED)
             self._shown_accuracy = ''
+
+
+def slope_of(ground: Ground) -> float:
+    """Angle between the ground and the horizontal, degrees."""
+    x, y, z = ground.normal
+    return round(math.degrees(math.atan2(math.hypot(x, y), z)), 6)
+
+
+def sloping(ground: Ground, scene: Scene, slope: float) -> Ground:
+    """The ground at another slope, degrees, tilted about its point below the middle of all dolls.
+
+    It falls in the direction in which it did, or towards +x. Raises OutOfRange.
+    """
+    errors.check_range('slope', slope, 0.0, MAX_SLOPE)
+    if slope == slope_of(ground):
+        return ground
+    x, y, z = ground.normal
+    heading = math.atan2(y, x) if math.hypot(x, y) > 1e-9 else 0.0
+    middle = np.mean([placement.position for placement in scene.dolls], axis=0)
+    middle[2] = (ground.offset - x * middle[0] - y * middle[1]) / z if z > 1e-9 else 0.0
+    angle = math.radians(slope)
+    normal = np.array((math.sin(angle) * math.cos(heading), math.sin(angle) * math.sin(heading),
+                       math.cos(angle)))
+    return Ground(tuple(normal.tolist()), float(normal @ middle))

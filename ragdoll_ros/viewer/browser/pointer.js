@@ -1,7 +1,9 @@
 // Sends where the pointer is over the picture, at most ten times a second: x to the right and y up,
-// from -1 to 1; nothing when it leaves, or while a button is down.
+// from -1 to 1; nothing when it leaves, or while a button is down. And 'click x y' for a click or a
+// tap, which moves by less than SLOP pixels in less than HOLD ms. Viser tells of no tap.
 function listen(send) {
-  let last = '', pending = null;
+  const SLOP = 6, HOLD = 500;
+  let last = '', pending = null, pressed = null;
   const later = (text) => {
     if (pending === null) setTimeout(() => {
       if (pending !== last) send(last = pending);
@@ -9,12 +11,27 @@ function listen(send) {
     }, 100);
     pending = text;
   };
+  const place = (event) => {
+    const frame = window.__viserMutable.canvas.getBoundingClientRect();
+    return [2 * (event.clientX - frame.left) / frame.width - 1,
+            1 - 2 * (event.clientY - frame.top) / frame.height].map((x) => x.toFixed(4)).join(' ');
+  };
+  const isOver = (event) => event.target === window.__viserMutable?.canvas;
   document.addEventListener('pointermove', (event) => {
-    const canvas = window.__viserMutable?.canvas;
-    if (event.buttons || event.target !== canvas) return later('');
-    const frame = canvas.getBoundingClientRect();
-    later([2 * (event.clientX - frame.left) / frame.width - 1,
-           1 - 2 * (event.clientY - frame.top) / frame.height].map((x) => x.toFixed(4)).join(' '));
+    later(event.buttons || !isOver(event) ? '' : place(event));
   });
   document.addEventListener('pointerleave', () => later(''));
+  // In the capture phase: what grabs a bone stops the event.
+  document.addEventListener('pointerdown', (event) => {
+    const {clientX, clientY, isPrimary, button, shiftKey, ctrlKey, metaKey} = event;
+    const plain = isPrimary && !button && !shiftKey && !ctrlKey && !metaKey;
+    pressed = plain && isOver(event) ? {clientX, clientY, since: event.timeStamp} : null;
+  }, true);
+  document.addEventListener('pointerup', (event) => {
+    const start = pressed;
+    pressed = null;
+    if (start && event.timeStamp - start.since < HOLD && Math.hypot(
+      event.clientX - start.clientX, event.clientY - start.clientY) < SLOP)
+      send(`click ${place(event)}`);
+  }, true);
 }

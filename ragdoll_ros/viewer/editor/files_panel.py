@@ -127,7 +127,7 @@ class FilesPanel:
 
     def _update_list(self) -> None:
         """List the files in the folder."""
-        entries = [f'{name} · {changed:{TIME}}' for name, changed in self._folder.saved()]
+        entries = [f'{name} · {changed:%Y-%m-%d}' for name, changed in self._folder.saved()]
         self.saved.options = (NONE, *entries)
         self.saved.value = NONE
 

@@ -57,13 +57,12 @@ class BallThrower:
         can_throw = source.recording is None
         self._by_click = server.gui.add_checkbox('Throw a ball by a click', False,
                                                 visible=can_throw, hint=HINT)
-        if can_throw:
-            server.scene.on_click()(self._on_click)
 
-    def add_key(self, server: viser.ViserServer, hover: Hover) -> None:
-        """Let the key T throw at a page's pointer, or at the middle of its picture."""
+    def connect(self, server: viser.ViserServer, hover: Hover) -> None:
+        """Let clicks throw, and the key T at a page's pointer or the middle of its picture."""
         if self._source.recording is not None:
             return
+        hover.on_click = self._on_click
         command = server.gui.add_command('Throw a ball', hotkey='T')
 
         @command.on_trigger
@@ -76,9 +75,10 @@ class BallThrower:
         """Whether a click throws."""
         return self._by_click.value and not self.is_editing()
 
-    async def _on_click(self, event: viser.SceneClickEvent) -> None:
+    def _on_click(self, client: viser.ClientHandle, origin: np.ndarray,
+                  direction: np.ndarray) -> None:
         if self.takes_clicks:
-            self.throw(event.client, np.array(event.ray_origin), np.array(event.ray_direction))
+            self.throw(client, origin, direction)
 
     def throw(self, client: viser.ClientHandle, origin: np.ndarray,
               direction: np.ndarray) -> None:
@@ -95,6 +95,8 @@ class BallThrower:
         elif self._pending is None:
             self._pending = origin, direction
             asyncio.get_running_loop().run_in_executor(None, self._add, client, frame.scene)
+            client.add_notification('A ball joins the scene', 'The scene starts again with it.',
+                                    auto_close_seconds=6)
 
     def update(self, frame: Frame, motion: Motion) -> None:
         """Throw what waits; ``motion`` is that of the newest frame."""

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import viser
@@ -26,6 +27,9 @@ class Hover:
         """Where each page's pointer is: from -1 to 1, to the right and up."""
         self._labels: dict[int, viser.LabelHandle] = {}
         self._next_update = 0.0
+        self.on_click: Callable[[viser.ClientHandle, np.ndarray, np.ndarray], None] = (
+            lambda client, origin, direction: None)
+        """Called in viser's thread with a page and the line of sight of a click or a tap."""
         self.pointer_events = add_listener(server.gui, 'pointer', 'pointer.js', self._take)
 
         @server.on_client_disconnect
@@ -34,13 +38,18 @@ class Hover:
             self._labels.pop(client.client_id, None)
 
     def _take(self, page: int, text: str) -> None:
-        """A pointer has moved, or left the picture."""
+        """A pointer has moved, clicked, or left the picture."""
+        is_click = text.startswith('click ')
+        client = self._server.get_clients().get(page)
         try:
-            x, y = map(float, text.split())
+            x, y = map(float, text.removeprefix('click ').split())
         except ValueError:
             self._pointers.pop(page, None)
-        else:
+            return
+        if not is_click:
             self._pointers[page] = x, y
+        elif client is not None and math.isfinite(x + y):
+            self.on_click(client, *ray(client.camera, x, y))
 
     def line_of_sight(self, client: viser.ClientHandle) -> tuple[np.ndarray, np.ndarray]:
         """Origin and direction (3,) through a page's pointer, or else the middle of its picture."""

@@ -1,6 +1,7 @@
 """Pushes by arrow keys and buttons, relative to the camera of the page that they come from."""
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -170,7 +171,9 @@ class PushKeys:
             return
         text = (f'Pushes {self._scene.bone_names[self.bone]}. A click chooses another bone.'
                 f'<br>A tap gives {self._mass():.3g} kg '
-                f'{self.strength.value * TAP / self._mass():.2g} m/s.')
+                f'{self.strength.value * TAP / self._mass():.2g} m/s in the air.')
+        if self._scene.ground is not None and math.isinf(self._scene.material.friction):
+            text += ' Friction is without limit: what lies on the ground does not slide.'
         content = f'<div style="font-size: 0.85em; padding: 0 1em 0.4em">{text}</div>'
         if content != self._effect.content:
             self._effect.content = content

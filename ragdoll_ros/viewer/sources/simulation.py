@@ -36,6 +36,9 @@ MEASURE_SHARE = 0.05
 ACCURACY = 'normal'
 """At the start."""
 
+FEW_BONES = 200
+"""Up to which contacts are kept with each frame, for who looks back: 20 us a tick of one doll."""
+
 MAX_NEW_FRAMES = 300
 """That are kept for the page: 3 s of ticks, in which it may draw nothing."""
 
@@ -244,7 +247,8 @@ class SimulationSource(Source):
     def _update_frame(self) -> None:
         simulation, requested = self._simulation, self._requested
         swings = simulation.swings
-        contacts = simulation.contacts if requested.contacts else None
+        contacts = simulation.contacts if requested.contacts or (
+            len(simulation.scene.bones) <= FEW_BONES) else None
         work = sum(simulation.work)
         self._frame = Frame(
             simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,

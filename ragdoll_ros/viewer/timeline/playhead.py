@@ -1,6 +1,8 @@
 """The playhead: which instant of a clip is shown, paused or playing."""
 from __future__ import annotations
 
+import numpy as np
+
 from ..sources.source import Frame
 from .frame_buffer import Clip
 
@@ -39,10 +41,13 @@ class Playhead:
         self.go_to(float(times[min(max(index, 0), len(times) - 1)] - times[0]), now)
 
     def toggle(self, now: float) -> None:
-        """Play or pause; at the end, play from the start."""
+        """Play or pause; at the end, play from the start of the last run."""
         time = self.time(now)
         self.is_playing = not self.is_playing
-        self.go_to(0.0 if self.is_playing and time >= self.clip.duration else time, now)
+        if self.is_playing and time >= self.clip.duration:
+            starts = np.flatnonzero(self.clip.resets)
+            time = float(self.clip.times[starts[-1]] - self.clip.times[0]) if len(starts) else 0.0
+        self.go_to(time, now)
 
     def set_speed(self, speed: float, now: float) -> None:
         """Set the speed from now on."""
