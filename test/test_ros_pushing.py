@@ -237,7 +237,7 @@ def test_a_ball_is_thrown_where_one_clicks(view, page, heard):
     view.page.mouse.down()
     view.page.mouse.move(corner[0] + 80, corner[1] + 10, steps=4)
     view.page.mouse.up()
-    view.look(CENTER + (5.0, 0.0, 0.0), CENTER)
+    view.look(CENTER + np.array((5.0, 0.0, 0.0)), CENTER)
     view.page.mouse.click(*corner)
     view.wait(lambda: len(events_of(events, 'set_state')) == 2)
     # Away, to the left and up, as seen from +x.

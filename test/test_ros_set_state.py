@@ -8,8 +8,15 @@ from pathlib import Path
 
 import pytest
 import yaml
-from geometry_msgs.msg import (Point, Pose, PoseArray, PoseWithCovariance, Quaternion, Twist,
-                               TwistWithCovariance)
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseArray,
+    PoseWithCovariance,
+    Quaternion,
+    Twist,
+    TwistWithCovariance,
+)
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Header, String
 

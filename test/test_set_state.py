@@ -18,9 +18,9 @@ RADIUS, GRAVITY = 0.1, 9.8
 BALL = Ragdoll('ball', (Bone('ball', Sphere(RADIUS), 1.0, (0, 0, 0)),))
 
 
-def with_ball(*dolls, ground=Ground()):
+def with_ball(*dolls):
     """A scene of a ball 20 m to the side, and dolls."""
-    return Scene('balls', (Placement(BALL, position=(0, 20, RADIUS)), *dolls), ground)
+    return Scene('balls', (Placement(BALL, position=(0, 20, RADIUS)), *dolls), Ground())
 
 
 def falling(count):
@@ -60,8 +60,8 @@ def test_axes_and_order_of_quaternions():
             simulation.advance()
         angles, rates = simulation.joint_angles, simulation.joint_rates
         s = math.sqrt(0.5)
-        state = simulation.set_state(simulation.scene.dolls[0].name, (1, 2, 3), (0, 0, 2 * s, 2 * s),
-                                     (4, 5, 6), (0.1, 0.2, 0.3))
+        state = simulation.set_state(simulation.scene.dolls[0].name, (1, 2, 3),
+                                     (0, 0, 2 * s, 2 * s), (4, 5, 6), (0.1, 0.2, 0.3))
         root = simulation.scene.bone_index(simulation.scene.dolls[0].doll.root.name)
         assert state.rotation_matrices[root][:, 0] == pytest.approx([0, 1, 0], abs=1e-12)
         assert state.rows[root] == pytest.approx([1, 2, 3, 0, 0, s, s, 4, 5, 6, 0.1, 0.2, 0.3])
@@ -90,7 +90,7 @@ def test_a_ball_wakes_what_it_hits():
             simulation.scene.dolls[1].doll.root)]
         before, time = simulation.energy_excess, 1 / 6
         velocity = np.array([12, 0, -0.5 / time + GRAVITY * time / 2])
-        simulation.set_state('ball', torso + [-2, 0, 0.5], velocity=velocity)
+        simulation.set_state('ball', torso + np.array((-2, 0, 0.5)), velocity=velocity)
         assert not simulation.asleep
         # Of 1 kg.
         assert simulation.work[0] == pytest.approx(

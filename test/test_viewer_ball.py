@@ -12,8 +12,16 @@ from page_client import served, wait
 from ragdoll_ros import Simulation
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.scene import Ground, height
-from ragdoll_ros.viewer.pushing.ball import (MASS, NAME, RADIUS, SPEED, aim, has_ball, launch,
-                                             with_ball)
+from ragdoll_ros.viewer.pushing.ball import (
+    MASS,
+    NAME,
+    RADIUS,
+    SPEED,
+    aim,
+    has_ball,
+    launch,
+    with_ball,
+)
 from ragdoll_ros.viewer.pushing.motion import Motion
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 from ragdoll_ros.viewer.sources.source import Frame
@@ -73,15 +81,15 @@ def test_what_a_line_of_sight_meets():
     scene = with_ball(DROP)
     with Simulation(scene) as simulation:
         head = simulation.state.positions[scene.bone_index('doll/head')]
-        simulation.set_state(NAME, head + [1, 0, 0])
+        simulation.set_state(NAME, head + np.array((1, 0, 0)))
         frame = Frame(scene, 0.0, simulation.state)
-        met, velocity = line(frame, head + [4, 0, 0], head)
+        met, velocity = line(frame, head + np.array((4, 0, 0)), head)
         assert np.abs(met - head).max() < 1e-9 and not velocity.any()
         met, _ = line(frame, (5, 5, 2), (5, 7, 0))
         assert met == pytest.approx((5, 7, 0))
         eye = np.array((5.0, 0, 1))
-        met, _ = line(frame, eye, eye + [0, 0, 1])
-        assert met == pytest.approx(eye + [0, 0, 3])
+        met, _ = line(frame, eye, eye + np.array((0, 0, 1)))
+        assert met == pytest.approx(eye + np.array((0, 0, 3)))
 
 
 @pytest.fixture
@@ -195,4 +203,4 @@ def test_a_scene_that_cannot_take_it_says_so(monkeypatch, page):
 def test_the_momentum_is_that_of_a_tap():
     """2000 N for 25 ms, as the page's arrow keys give: neither moves a doll out of sight."""
     from ragdoll_ros.realtime.arrow_keys import FORCE, TAP
-    assert MASS * SPEED == pytest.approx(FORCE * TAP)
+    assert pytest.approx(FORCE * TAP) == MASS * SPEED

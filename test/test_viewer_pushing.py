@@ -11,9 +11,9 @@ from page_client import served, wait
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.realtime.arrow_keys import DIRECTIONS
+from ragdoll_ros.realtime.speed_limit import LONGEST, RESPONSE_TIME, SpeedLimit
 from ragdoll_ros.viewer.pushing.directions import seen_from
 from ragdoll_ros.viewer.pushing.hover import bone_at, ray
-from ragdoll_ros.realtime.speed_limit import LONGEST, RESPONSE_TIME, SpeedLimit
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 
 FLIGHT = load_scene('flight')

@@ -16,7 +16,7 @@ from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.scene import Ground
 from ragdoll_ros.physics.accuracy import ACCURACIES
 from ragdoll_ros.viewer.health import GRACE, figures, health
-from ragdoll_ros.viewer.settings_panel import ERRORS_MM, sloping, slope_of
+from ragdoll_ros.viewer.settings_panel import ERRORS_MM, slope_of, sloping
 from ragdoll_ros.viewer.sources.simulation import SimulationSource, TickStatistics
 from ragdoll_ros.viewer.sources.source import RequestedData, SourceStatus
 from ragdoll_ros.viewer.widgets.form import AMBER, GREEN, GREY, RED

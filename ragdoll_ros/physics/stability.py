@@ -112,8 +112,8 @@ class StabilityTest:
             for k, kinetic in zip(range(SAMPLES + 1), energies, strict=False):
                 # What has ended goes on with the others, but does not count: so a doll's verdict is
                 # the same in a crowd as alone.
-                now = np.where(ended, speeds[k], np.sqrt(2 * np.bincount(clusters, kinetic * dolls)))
-                speeds[k:] = now
+                now = np.sqrt(2 * np.bincount(clusters, kinetic * dolls))
+                now = speeds[k:] = np.where(ended, speeds[k], now)
                 if k > 1:
                     exceeded |= ~ended & (now > GROWTH * (at_rest[k] + speeds[0])) & (
                         now > speeds[k - 1])

@@ -25,8 +25,8 @@ LATE = 0.95
 MAX_ENERGY_GAIN = 1e-3
 """Energy gain that raises a warning, as a fraction of the energy of a fall and the work done."""
 
-SLOW = ('Slower than requested: a tick takes {cost:.1f} of {due:.1f} ms. Choose accuracy draft, or a '
-        'lower speed in the bar below.')
+SLOW = ('Slower than requested: a tick takes {cost:.1f} of {due:.1f} ms. Choose accuracy draft, or '
+        'a lower speed in the bar below.')
 BUSY = 'Slower than requested: the machine is busy with other programs.'
 GAINED = ('Inaccurate: {energy:.3g} J of energy have come from errors of the computation. Use '
           'accuracy exact, or the engine rigid.')

@@ -39,9 +39,9 @@ IDLE_PERIOD = 0.1
 
 SIMULATION_HINT = ('<span class="ragdoll-mouse">Drag a bone. Arrow keys push, tap or hold; a click '
                    'on a bone chooses which. T throws a ball. Space pauses, R resets, E edits, '
-                   'H shows the home view.</span><span class="ragdoll-touch">Drag a bone with one finger. The '
-                   'arrows below push; a tap on a bone chooses which. Two fingers move the view.'
-                   '</span>')
+                   'H shows the home view.</span><span class="ragdoll-touch">Drag a bone with one '
+                   'finger. The arrows below push; a tap on a bone chooses which. Two fingers move '
+                   'the view.</span>')
 RECORDING_HINT = ('A recorded run. Space pauses, R restarts, drag the bar below the picture '
                   'or press , and . to step, H shows the home view.')
 

@@ -48,8 +48,9 @@ class RecordingPanel:
                 if CAN_WRITE else 'Requires mcap: pip install mcap')
             screenshot = server.gui.add_button('Screenshot', icon=viser.Icon.CAMERA,
                                                hint='This view as ragdoll.png')
-            export = server.gui.add_button('Export: glTF, BVH, CSV, MCAP', icon=viser.Icon.DOWNLOAD, hint='The whole '
-                                           'timeline as run.zip; glTF for Blender')
+            export = server.gui.add_button(
+                'Export: glTF, BVH, CSV, MCAP', icon=viser.Icon.DOWNLOAD,
+                hint='The whole timeline as run.zip; glTF for Blender')
         self._frame: Frame | None = None
         export.on_click(self._send_export)
         self.button.on_click(lambda event: self.toggle(event.client))

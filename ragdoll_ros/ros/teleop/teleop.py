@@ -1,9 +1,9 @@
 """Keyboard teleoperation: Up pushes the doll away from you, Down toward you, Left and Right.
 
-You look at the doll's face, from +x along -x. A push is 2000 N: a tap gives the doll about 1 m/s. A
-held key brings the doll to a top speed, 3 m/s by default, which + and - change; with --force, and in
-the scene `article`, it pushes with 2000 N until its release. Pushes of several keys add up. Space
-pauses and resumes, r resets, q quits.
+You look at the doll's face, from +x along -x. A push is 2000 N: a tap gives the doll about 1 m/s.
+A held key brings the doll to a top speed, 3 m/s by default, which + and - change; with --force, and
+in the scene `article`, it pushes with 2000 N until its release. Pushes of several keys add up.
+Space pauses and resumes, r resets, q quits.
 """
 from __future__ import annotations
 

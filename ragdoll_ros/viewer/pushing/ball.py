@@ -158,7 +158,7 @@ def aim(frame: Frame, motion: Motion, origin: np.ndarray,
 def launch(scene: Scene, origin: np.ndarray, target: np.ndarray, velocity: np.ndarray
            ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Position (3,) m and velocity (3,) m/s with which a ball meets ``target`` (3,) m, which moves
-    with ``velocity`` (3,) m/s and does not fall: x = x0 + v t + g t^2 / 2 with t = distance / SPEED.
+    with ``velocity`` (3,) m/s and does not fall: x = x0 + v t + g t^2 / 2, t = distance / SPEED.
     """
     way = target - origin
     distance = max(float(np.linalg.norm(way)), 1e-6)

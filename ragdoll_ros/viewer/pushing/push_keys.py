@@ -11,11 +11,11 @@ import viser
 
 from ...model.scene import Scene
 from ...realtime.arrow_keys import DIRECTIONS, FORCE, TAP, PressedKeys
+from ...realtime.speed_limit import RESPONSE_TIME, SpeedLimit
 from ..browser.scripts import add_listener
 from ..sources.source import Frame, Source
 from .directions import seen_from
 from .motion import Motion
-from ...realtime.speed_limit import RESPONSE_TIME, SpeedLimit
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
 """By the labels of their buttons, short enough for one row."""

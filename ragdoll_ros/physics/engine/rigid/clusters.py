@@ -178,7 +178,8 @@ class Clusters:
         """
         self.q[self._q[doll]], self.v[self._v[doll]] = q[self._q[doll]], v[self._v[doll]]
         cluster = self.members[self.of_doll[doll]]
-        cluster.state.q[:], cluster.state.v[:] = self.q[cluster.q_indices], self.v[cluster.v_indices]
+        cluster.state.q[:] = self.q[cluster.q_indices]
+        cluster.state.v[:] = self.v[cluster.v_indices]
         _invalidate(cluster)
 
     def add_work(self, energies: np.ndarray) -> None:

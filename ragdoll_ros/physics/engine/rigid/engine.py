@@ -127,10 +127,12 @@ class RigidEngine:
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
         before = self.doll_totals.energy
-        self._clusters.set_velocities(dolls, self._in_root_axes(GeneralizedState(self._clusters.q, velocities)))
+        clusters = self._clusters
+        clusters.set_velocities(dolls, self._in_root_axes(
+            GeneralizedState(clusters.q, velocities)))
         self._last_start = None
         self._refresh()
-        self._clusters.add_work(self.doll_totals.energy - before)
+        clusters.add_work(self.doll_totals.energy - before)
 
     def simulate_copy(self, dolls: np.ndarray, velocities: np.ndarray,
                       interval: float) -> Generator[np.ndarray, None, None]:
@@ -139,7 +141,8 @@ class RigidEngine:
         fine = dataclasses.replace(coarse, step=COPY_START * coarse.step / 2)
         saved = clusters.save_states(dolls)
         try:
-            clusters.set_velocities(dolls, self._in_root_axes(GeneralizedState(self._clusters.q, velocities)))
+            clusters.set_velocities(dolls, self._in_root_axes(
+                GeneralizedState(clusters.q, velocities)))
             clusters.advance(0.0, fine, ~dolls)
             yield clusters.sums['kinetic'].copy()
             clusters.advance(COPY_START * interval, fine, ~dolls)

@@ -211,8 +211,7 @@ class SubsteppedEngine(ABC):
         raise NotImplementedError
 
     def _lift_out_of_ground(self, dolls: Sequence[int]) -> None:
-        """Raise those ``dolls`` that penetrate the ground: they would stay in it or be thrown out.
-        """
+        """Raise those ``dolls`` that penetrate the ground: else they stay there or are thrown."""
         heights = self._heights(self.state)
         depths = -np.array([heights[own].min() for own in self.scene.bone_slices])
         sunk = (depths > allowed_penetration(self.scene)) & np.isin(np.arange(len(depths)), dolls)
