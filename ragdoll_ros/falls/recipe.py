@@ -127,7 +127,7 @@ def recipe_of(data: dict) -> Recipe:
 def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelError]]:
     """Make a recipe from the data of the YAML file at ``path``: it, or None and every error."""
     found = schema_errors('recipe', data)
-    if not is_marked('recipe', data):
+    if not is_marked(data, 'recipe'):
         return None, found
     dolls, more = _dolls(data, path)
     found += more

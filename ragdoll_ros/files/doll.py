@@ -71,7 +71,7 @@ def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
 def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None, list[ModelError]]:
     """Build a doll from the data of the YAML file at ``path``; else None and every error."""
     found = schema_errors('doll', data)
-    if not is_marked('doll', data):
+    if not is_marked(data, 'doll'):
         return None, found
     bones = build_each(data, 'bones', _bone, found)
     joints = build_each(data, 'joints', _joint, found)

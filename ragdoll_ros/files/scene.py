@@ -77,7 +77,7 @@ def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
 def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError]]:
     """Build a scene from the data of a scene's file; else None and every error."""
     found = schema_errors('scene', data)
-    if not is_marked('scene', data):
+    if not is_marked(data, 'scene'):
         return None, found
     placements: list[Any] = []
     entries = data.get('dolls')

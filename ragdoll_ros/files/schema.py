@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeGuard, TypeVar
 
 import jsonschema
 
@@ -23,16 +23,16 @@ MARKS = {'scene': 'dolls', 'doll': 'bones', 'recipe': 'who'}
 set a node's scene could read any file by them."""
 
 
-def is_marked(schema: str, data: object) -> bool:
+def is_marked(data: object, schema: str) -> TypeGuard[dict]:
     """Whether data may be meant as a scene, a doll or a recipe of falls."""
     return isinstance(data, dict) and MARKS[schema] in data
 
 
 def schema_errors(schema: str, data: object) -> list[ModelError]:
     """All violations of the schema ``schema``, a key of MARKS."""
-    if not is_marked(schema, data):
+    if not is_marked(data, schema):
         form = 'a mapping' if isinstance(data, dict) else 'no mapping'
-        others = [other for other in MARKS if is_marked(other, data)]
+        others = [other for other in MARKS if is_marked(data, other)]
         is_other = f', but a {others[0]}' if others else ''
         return [errors.WrongForm('', f'{form} without {MARKS[schema]}{is_other}',
                                  f'a {schema}, which has {MARKS[schema]}')]
