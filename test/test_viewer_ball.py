@@ -99,10 +99,10 @@ def page():
 
 
 def click(page, client, eye, at=(0.0, 0.0, 0.3)):
-    """Look at a point, and click at the middle of the picture."""
-    camera, = (each.camera for each in page.server.get_clients().values())
-    wait(lambda: client.look(eye, at) or tuple(camera.position) == eye)
-    client.tell(page._hover.pointer_events, 'click 0.0 0.0')
+    """A click at a point, seen from another one."""
+    way = np.subtract(at, eye)
+    numbers = ' '.join(f'{x:.4f}' for x in (*eye, *(way / np.linalg.norm(way))))
+    client.tell(page._hover.pointer_events, f'click {numbers}')
 
 
 @pytest.fixture

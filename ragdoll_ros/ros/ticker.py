@@ -112,9 +112,10 @@ class Ticker:
         for throttle in self._throttles.values():
             throttle.wake(woken)
         end, dropped = woken + MAX_CALLBACK_TIME, self._pacer.dropped_time
-        for _ in range(self._max_ticks):
+        for index in range(self._max_ticks):
             now = time.monotonic_ns()
-            if now > end or not self._pacer.due(now):
+            # A second one before it is due would have a stamp in the future.
+            if now > end or not self._pacer.due(now, early=index == 0):
                 break
             self._tick(self._pacer.last_due)
         if self._pacer.dropped_time != dropped:

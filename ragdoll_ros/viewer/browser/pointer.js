@@ -1,6 +1,7 @@
 // Sends where the pointer is over the picture, at most ten times a second: x to the right and y up,
-// from -1 to 1; nothing when it leaves, or while a button is down. And 'click x y' for a click or a
-// tap, which moves by less than SLOP pixels in less than HOLD ms. Viser tells of no tap.
+// from -1 to 1; nothing when it leaves, or while a button is down. And 'click' with the origin and
+// the direction of the line of sight, m, z up, of a click or a tap, which moves by less than SLOP
+// pixels in less than HOLD ms. Viser tells of no tap, and of the camera only later.
 function listen(send) {
   const SLOP = 6, HOLD = 500;
   let last = '', pending = null, pressed = null;
@@ -11,14 +12,22 @@ function listen(send) {
     }, 100);
     pending = text;
   };
+  const text = (numbers) => numbers.map((number) => number.toFixed(4)).join(' ');
   const place = (event) => {
     const frame = window.__viserMutable.canvas.getBoundingClientRect();
     return [2 * (event.clientX - frame.left) / frame.width - 1,
-            1 - 2 * (event.clientY - frame.top) / frame.height].map((x) => x.toFixed(4)).join(' ');
+            1 - 2 * (event.clientY - frame.top) / frame.height];
+  };
+  const sight = (event) => {
+    const {camera, nodeRefFromName: nodes} = window.__viserMutable;
+    const toWorld = nodes[''].matrixWorld.clone().invert();
+    const eye = camera.position.clone().applyMatrix4(toWorld);
+    const far = camera.position.clone().set(...place(event), 0.5).unproject(camera);
+    return [...eye, ...far.applyMatrix4(toWorld).sub(eye).normalize()];
   };
   const isOver = (event) => event.target === window.__viserMutable?.canvas;
   document.addEventListener('pointermove', (event) => {
-    later(event.buttons || !isOver(event) ? '' : place(event));
+    later(event.buttons || !isOver(event) ? '' : text(place(event)));
   });
   document.addEventListener('pointerleave', () => later(''));
   // In the capture phase: what grabs a bone stops the event.
@@ -32,6 +41,6 @@ function listen(send) {
     pressed = null;
     if (start && event.timeStamp - start.since < HOLD && Math.hypot(
       event.clientX - start.clientX, event.clientY - start.clientY) < SLOP)
-      send(`click ${place(event)}`);
+      send(`click ${text(sight(event))}`);
   }, true);
 }

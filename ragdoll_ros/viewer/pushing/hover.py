@@ -39,17 +39,17 @@ class Hover:
 
     def _take(self, page: int, text: str) -> None:
         """A pointer has moved, clicked, or left the picture."""
-        is_click = text.startswith('click ')
-        client = self._server.get_clients().get(page)
         try:
-            x, y = map(float, text.removeprefix('click ').split())
+            numbers = list(map(float, text.removeprefix('click ').split()))
         except ValueError:
+            numbers = []
+        client = self._server.get_clients().get(page)
+        if not text.startswith('click '):
             self._pointers.pop(page, None)
-            return
-        if not is_click:
-            self._pointers[page] = x, y
-        elif client is not None and math.isfinite(x + y):
-            self.on_click(client, *ray(client.camera, x, y))
+            if len(numbers) == 2:
+                self._pointers[page] = numbers[0], numbers[1]
+        elif client is not None and len(numbers) == 6 and all(map(math.isfinite, numbers)):
+            self.on_click(client, np.array(numbers[:3]), np.array(numbers[3:]))
 
     def line_of_sight(self, client: viser.ClientHandle) -> tuple[np.ndarray, np.ndarray]:
         """Origin and direction (3,) through a page's pointer, or else the middle of its picture."""
