@@ -12,6 +12,9 @@ from ..model.vectors import Vector
 FORCE = 2000.0
 """N: default force of a push."""
 
+ARTICLE = 'article'
+"""Name of the scene whose keys have the article's directions and push for as long as held."""
+
 LIFT = 0.0005
 """Upward force relative to the push, from the article."""
 

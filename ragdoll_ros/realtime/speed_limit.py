@@ -5,6 +5,9 @@ from collections import deque
 
 import numpy as np
 
+TOP_SPEED, TOP_SPEEDS = 3.0, (0.5, 20.0)
+"""m/s that a held key brings the doll to: by default, a run, and the range of the setting."""
+
 RESPONSE_TIME = 0.15
 """s in which the force of a held key would give the speed that is missing: too short to be felt,
 and longer than DELAY, so that the speed is not passed."""

@@ -17,7 +17,7 @@ from visualization_msgs.msg import MarkerArray
 
 from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
-from .late_topic import LATCHED_HISTORY, LateTopic
+from .latched_topic import LATCHED_HISTORY, LatchedTopic
 from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
 from .messages.measures import TickMeasures, checksum, serialize_measures
 from .messages.serialized import serialize_pose_array
@@ -38,15 +38,15 @@ class Outputs:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._poses = LateTopic(node, PoseArray, '~/poses')
+        self._poses = LatchedTopic(node, PoseArray, '~/poses')
         self._state = node.create_publisher(MultiDOFJointState, '~/state', 10)
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
-        self._measures = LateTopic(node, DiagnosticArray, '~/measures')
+        self._measures = LatchedTopic(node, DiagnosticArray, '~/measures')
         self._run: tuple[Simulation | None, int, int] = (None, 0, 0)
         """The simulation that was published last, its reset_count, and the number of that run."""
-        self._swings: LateTopic | None = None
+        self._swings: LatchedTopic | None = None
         self._contacts = node.create_publisher(PoseArray, '~/contacts', 10)
-        self._markers = LateTopic(node, MarkerArray, '~/markers')
+        self._markers = LatchedTopic(node, MarkerArray, '~/markers')
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._tf = TfPublisher(node)
         self._clock: Publisher | None = None
@@ -149,7 +149,7 @@ class Outputs:
     def _set_swings_publisher(self, enabled: bool) -> None:
         """Create or destroy the publisher of ~/swings: a scene without swings has no such topic."""
         if enabled and self._swings is None:
-            self._swings = LateTopic(self._node, PoseArray, '~/swings')
+            self._swings = LatchedTopic(self._node, PoseArray, '~/swings')
         elif not enabled and self._swings is not None:
             self._swings.destroy()
             self._swings = None

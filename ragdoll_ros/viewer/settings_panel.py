@@ -78,8 +78,8 @@ class SettingsPanel:
         error = ERRORS_MM.get(status.engine_name, {}).get(status.accuracy)
         if error is None or math.isnan(status.tick_cost):
             return ''
-        return (f'A tick takes {1e3 * status.tick_cost:.2g} ms. Typical error: {error:g} mm after '
-                '0.1 s of contacts.')
+        return (f'A tick takes {parsing.two_digits(1e3 * status.tick_cost)} ms. Typical error: '
+                f'{error:g} mm after 0.1 s of contacts.')
 
     async def _on_accuracy(self, event: viser.GuiEvent) -> None:
         """Set the chosen accuracy in another thread, as it may wait for a node's response."""

@@ -3,17 +3,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from geometry_msgs.msg import Point, Vector3
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 
 from ...model import errors, rotation
 from ...model.drive import MAX_SPEED
 from ...model.ragdoll import WORLD
-from ...model.vectors import Vector, clamp_norm, unit_vector
+from ...model.vectors import unit_vector
 from ...physics.simulation import Simulation
 from ..parameters.node_settings import NodeSettings
 from .input_counts import InputCounts
+from .subscriptions import limited
 
 TOPIC = '~/set_state'
 
@@ -50,20 +50,9 @@ class StateSubscription:
         orientation = unit_vector('pose.orientation', (q.x, q.y, q.z, q.w),
                                   'a quaternion x, y, z, w, not zero', 4)
         velocity, spin = (
-            tuple(rotation.rotate(orientation, self._limited(f'twist.{name}', vector)).tolist())
+            tuple(rotation.rotate(orientation, limited(
+                self._counts, TOPIC, f'twist.{name}', vector, MAX_SPEED, 'the limit')).tolist())
             for name, vector in (('linear', twist.linear), ('angular', twist.angular)))
-        self.simulation.set_state(message.child_frame_id, _xyz(pose.position), orientation,
-                                  velocity, spin)
-
-    def _limited(self, name: str, vector: Vector3) -> Vector:
-        """The vector, shortened to MAX_SPEED. NotFinite if it is not finite."""
-        values = _xyz(vector)
-        errors.check_finite(name, values)
-        result, length = clamp_norm(values, MAX_SPEED)
-        if length > MAX_SPEED:
-            self._counts.clamp(TOPIC, f'{name} of {length:g} to the limit, {MAX_SPEED:g}')
-        return result
-
-
-def _xyz(vector: Point | Vector3) -> Vector:
-    return vector.x, vector.y, vector.z
+        p = pose.position
+        self.simulation.set_state(message.child_frame_id, (p.x, p.y, p.z), orientation, velocity,
+                                  spin)

@@ -108,10 +108,15 @@ class PushSubscriptions:
 
     def _limited(self, source: str, name: str, vector: Vector3, limit: float,
                  limit_name: str) -> Vector:
-        """The vector, shortened to ``limit``. NotFinite if the message is not finite."""
-        values = (vector.x, vector.y, vector.z)
-        errors.check_finite(name, values)
-        result, length = clamp_norm(values, limit)
-        if length > limit:
-            self._counts.clamp(source, f'{name} of {length:g} to {limit_name}, {limit:g}')
-        return result
+        return limited(self._counts, source, name, vector, limit, limit_name)
+
+
+def limited(counts: InputCounts, source: str, name: str, vector: Vector3, limit: float,
+            limit_name: str) -> Vector:
+    """The vector, shortened to ``limit``, which is counted. NotFinite if it is not finite."""
+    values = (vector.x, vector.y, vector.z)
+    errors.check_finite(name, values)
+    result, length = clamp_norm(values, limit)
+    if length > limit:
+        counts.clamp(source, f'{name} of {length:g} to {limit_name}, {limit:g}')
+    return result

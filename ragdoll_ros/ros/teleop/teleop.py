@@ -24,8 +24,8 @@ from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import SetBool, Trigger
 
 from ...model.vectors import Vector
-from ...realtime.arrow_keys import DIRECTIONS, TAP, HeldKeys, total_force
-from ...realtime.speed_limit import RESPONSE_TIME, SpeedLimit
+from ...realtime.arrow_keys import ARTICLE, DIRECTIONS, TAP, HeldKeys, total_force
+from ...realtime.speed_limit import RESPONSE_TIME, TOP_SPEED, TOP_SPEEDS, SpeedLimit
 from ..process.rclpy_context import rclpy_context
 from .doll_motion import DollMotion
 from .status_line import StatusLine
@@ -46,11 +46,8 @@ GRAPH_PERIOD = 0.5
 TOPIC_TYPES = {'/poses': 'geometry_msgs/msg/PoseArray', '/force': 'geometry_msgs/msg/Wrench'}
 """Topics by which a ragdoll node is recognized, relative to its name."""
 
-TOP_SPEED, TOP_SPEEDS, SPEED_STEP = 3.0, (0.5, 20.0), 0.5
-"""m/s that a held key brings the doll to: by default a run; the range; the step of + and -."""
-
-ARTICLE = 'article'
-"""Name of the scene in which a held key pushes with its whole force, as in the article."""
+SPEED_STEP = 0.5
+"""m/s by which + and - change the top speed."""
 
 HELP = 'arrows push: tap or hold | + - top speed | space pauses | r resets | q quits'
 

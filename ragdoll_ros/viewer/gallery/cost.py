@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ...files.scene import load_scene
 from ...physics.simulation import Simulation
+from ..widgets.parsing import two_digits
 
 FOLDER = Path(__file__).parent
 
@@ -42,8 +43,7 @@ def estimated_cost(name: str, reference: float) -> float:
 def cost_text(cost: float, step: float, pace: float) -> tuple[str, bool]:
     """A cost, ms, in words, and whether ticks of ``step`` s are too slow for a ``pace``."""
     factor = 1e3 * step / cost
-    number = f'{cost:.0f}' if cost >= 100 else f'{cost:.2g}'
-    ticks = f'a tick of {1e3 * step:g} ms takes {number} ms'
+    ticks = f'a tick of {1e3 * step:g} ms takes {two_digits(cost)} ms'
     if factor >= pace:
         return f'{"Real time" if pace == 1 else f"{pace:g} of real time"} here: {ticks}', False
     return f'At most {factor:.2g} of real time here: {ticks}', True

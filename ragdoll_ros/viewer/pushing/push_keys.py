@@ -10,8 +10,8 @@ import numpy as np
 import viser
 
 from ...model.scene import Scene
-from ...realtime.arrow_keys import DIRECTIONS, FORCE, TAP, PressedKeys
-from ...realtime.speed_limit import RESPONSE_TIME, SpeedLimit
+from ...realtime.arrow_keys import ARTICLE, DIRECTIONS, FORCE, TAP, PressedKeys
+from ...realtime.speed_limit import RESPONSE_TIME, TOP_SPEED, TOP_SPEEDS, SpeedLimit
 from ..browser.scripts import add_listener
 from ..sources.source import Frame, Source
 from .directions import seen_from
@@ -26,17 +26,8 @@ STRENGTHS = (100.0, 5000.0)
 STEP = 50.0
 """N: of the slider."""
 
-TOP_SPEED = 3.0
-"""m/s that a held key brings the doll to, by default: a run."""
-
-TOP_SPEEDS = (0.5, 20.0)
-"""m/s: smallest and largest of the slider."""
-
 REPEAT_PERIOD = 0.04
 """s between two pushes of a held key, well below the node's push_timeout, and their duration."""
-
-ARTICLE = 'article'
-"""Name of the scene whose keys have the article's directions, wherever the camera is."""
 
 
 class PushKeys:
@@ -173,7 +164,7 @@ class PushKeys:
                 f'<br>A tap gives {self._mass():.3g} kg '
                 f'{self.strength.value * TAP / self._mass():.2g} m/s in the air.')
         if self._scene.ground is not None and math.isinf(self._scene.material.friction):
-            text += ' Friction is without limit: what lies on the ground does not slide.'
+            text += ' Friction is unlimited: what lies on the ground does not slide.'
         content = f'<div style="font-size: 0.85em; padding: 0 1em 0.4em">{text}</div>'
         if content != self._effect.content:
             self._effect.content = content

@@ -118,6 +118,11 @@ def parse_color(event: str) -> tuple[int, int, int]:
     return tuple(bytes.fromhex(match[1]))
 
 
+def two_digits(number: float) -> str:
+    """A positive number with two significant digits, without an exponent above 1e-4."""
+    return f'{number:.0f}' if number >= 99.5 else f'{number:.2g}'
+
+
 def format_number(value: float) -> str:
     """A number with seven digits, so a length in m to 0.1 um; 0 for what is only rounding."""
     value = 0.0 if abs(value) < ROUNDING else value

@@ -10,7 +10,7 @@ LATCHED_HISTORY = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOC
 lost on their way, as a message that is not yet acknowledged makes room for a new one."""
 
 
-class LateTopic:
+class LatchedTopic:
     """Publishes ``kind`` on ``name`` while there are subscribers.
 
     What was published before they left would be old for the next one: it is forgotten.
