@@ -629,6 +629,13 @@ def test_undo_never_leads_out_of_the_scene_at_hand(desk):
     assert desk.panel.undo.disabled
 
 
+def test_a_change_of_settings_is_a_step_of_that_name(desk):
+    desk.editor.show(dataclasses.replace(DROP, gravity=(0.0, 0.0, -1.6)))
+    assert 'settings' in desk.panel.undo.label
+    desk.editor.undo()
+    assert desk.editor.scene == DROP
+
+
 def test_a_page_that_draws_late_does_not_undo(desk):
     desk.editor.select('head')
     scenes = []

@@ -32,7 +32,7 @@ from ragdoll_ros.viewer.drawing.bodies import Bodies
 from ragdoll_ros.viewer.drawing.joint_balls import joint_balls
 from ragdoll_ros.viewer.drawing.joint_limits import ARC_SEGMENTS, RIM, SPOKES, JointLimits
 from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, SEGMENTS
-from ragdoll_ros.viewer.drawing.overlays import arrow_to_surface, force_arrows
+from ragdoll_ros.viewer.drawing.overlays import LABEL_GAP, MOST_LABELS, apart, arrow_to_surface, force_arrows
 from ragdoll_ros.viewer.drawing.skin_meshes import SkinMeshes
 from ragdoll_ros.viewer.drawing.stage import CELL, FADE, grid_size
 from ragdoll_ros.viewer.pointer import nearest_bone, target_at_distance, to_bone_frame
@@ -213,6 +213,21 @@ def test_no_arrow_where_a_source_knows_no_forces():
         frame = Frame(scene, 0.0, simulation.state, contacts=np.zeros((3, 3)))
     arrows, newtons = force_arrows(frame)
     assert len(arrows) == len(newtons) == 0
+
+
+@pytest.mark.parametrize('count', [0, 1, 2, 3, 5, 6, 8, 12, 40])
+def test_labels_do_not_lie_on_stronger_ones(count):
+    """Each tip has a label, or is near one that is stronger, or there are as many as there may be.
+    """
+    tips = np.random.default_rng(count).uniform(0, 1, (count, 3)) * (1, 1, 0.1)
+    labelled = apart(tips)
+    assert sorted(labelled) == labelled and len(labelled) <= MOST_LABELS
+    assert labelled[:1] == [0][:count]
+    distances = np.linalg.norm(tips[:, None] - tips[None], axis=2)
+    for index in range(count):
+        stronger = [other for other in labelled if other < index]
+        near = (distances[index, stronger] < LABEL_GAP).any()
+        assert (index in labelled) == (not near and len(stronger) < MOST_LABELS)
 
 
 @pytest.fixture(scope='module')

@@ -21,6 +21,9 @@ LEAST_FORCE = 0.01
 MOST_ARROWS, MOST_LABELS = 100, 12
 """Of forces, the strongest first."""
 
+LABEL_GAP = 0.15
+"""m: a force whose tip is nearer to that of a stronger one has no label, which would lie on it."""
+
 BROWN, RED, BLUE, ORANGE = (90, 50, 25), (230, 50, 25), (30, 110, 230), (235, 110, 0)
 ROD_THICKNESS = 0.012
 """m: of a swing's rods."""
@@ -71,7 +74,8 @@ class Overlays:
         self._set('contacts', frame.contacts)
         arrows, newtons = force_arrows(frame)
         self._set('forces', arrows)
-        self._label(arrows[:MOST_LABELS], newtons)
+        labelled = apart(arrows[:, 1])
+        self._label(arrows[labelled], newtons[labelled])
 
     def _label(self, arrows: np.ndarray, newtons: np.ndarray) -> None:
         """Write the forces at the tips of their arrows (k, 2, 3) m."""
@@ -122,6 +126,17 @@ def force_arrows(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     tails = moments[order] / total[order, None]
     lengths = np.minimum(WEIGHT_LENGTH / weight, MAX_LENGTH / newtons[order])
     return np.stack([tails, tails + forces[order] * lengths[:, None]], axis=1), newtons[order]
+
+
+def apart(tips: np.ndarray) -> list[int]:
+    """Indices of those tips (k, 3) m, at most MOST_LABELS, that are LABEL_GAP from all before."""
+    found: list[int] = []
+    for index, tip in enumerate(tips):
+        if all(np.linalg.norm(tip - tips[other]) >= LABEL_GAP for other in found):
+            found.append(index)
+        if len(found) == MOST_LABELS:
+            break
+    return found
 
 
 def arrow_to_surface(bone: Bone, push: Push, position: np.ndarray,

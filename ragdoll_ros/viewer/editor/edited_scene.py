@@ -46,7 +46,8 @@ class EditedScene:
                 while self._pending.popleft() != scene:
                     pass
             elif scene != self.current:
-                self._push(scene, f'scene {scene.name}')
+                is_same = (scene.name, scene.dolls) == (self.current.name, self.current.dolls)
+                self._push(scene, 'settings' if is_same else f'scene {scene.name}')
 
     def set(self, scene: Scene, name: str, pause: bool) -> None:
         """Make a scene current, as a change called ``name``; RagdollError if it is refused."""
