@@ -71,6 +71,7 @@ def test_roots_and_directions_are_given_in_the_dolls_frame():
     ({'links': [{'length': 1e-4}]}, errors.OutOfRange, 'swings[0].links[0].length'),
     ({'links': [{'length': 1, 'damping': -1}]}, errors.OutOfRange, 'swings[0].links[0].damping'),
     ({'strand': {'links': 2, 'length': 1}}, errors.WrongForm, 'swings[0]'),
+    ({'independent': 1}, errors.WrongForm, 'swings[0].independent'),
 ])
 def test_what_is_wrong_with_a_swing_is_named(changes, error, path):
     bones = [{'name': 'head', 'shape': {'sphere': {'radius': 0.1}}, 'mass': 1,
@@ -100,3 +101,18 @@ def test_a_strand_is_short_for_links_from_stiff_to_limp():
     data['swings'][0]['strand'] = {'links': 3, 'length': 0.3, 'mass': 0.6, 'stiffness': [3, 1],
                                    'damping': 0.5}
     assert build_doll(data)[0] == doll
+
+
+def test_a_strap_is_short_for_links_of_a_rigidity():
+    links = strand(4, 0.4, 0.8, damping=0.3, rigidity=0.05)
+    assert [link.stiffness for link in links] == pytest.approx([1.0, 0.5, 0.5, 0.5])
+    assert [link.mass for link in links] == pytest.approx([0.2, 0.2, 0.2, 0.1])
+    with pytest.raises(errors.WrongForm, match='rigidity'):
+        strand(4, 0.4, 0.8, 1.0, rigidity=0.05)
+
+
+def test_independent_links_survive_a_round_trip():
+    swing = Swing('a', 'head', (0, 0, 0), (0, 0, 1), strand(2, 0.2), independent=True)
+    doll = Ragdoll('doll', (HEAD,), (), (swing,))
+    assert doll_data(doll)['swings'][0]['independent'] is True
+    assert build_doll(doll_data(doll))[0] == doll

@@ -1,4 +1,4 @@
-"""Sines, cosines and inverse hyperbolic sines against the C library's and against many digits."""
+"""Sines, arcs, exponentials and the like against the C library's and against many digits."""
 import math
 
 import pytest
@@ -47,3 +47,23 @@ def test_inverse_hyperbolic_sine(compiled, x):
     for signed in (x, -x):
         assert compiled[1](signed) == pytest.approx(math.asinh(signed), rel=2e-15)  # some roundings
     assert math.isnan(compiled[1](math.nan))
+
+
+@pytest.mark.parametrize('angle', [0.0, 1e-300, 1e-17, 1e-9, 0.01, 0.0624, 0.0626, 0.5, 1.0,
+                                   math.pi / 2, 1.6, 3.0, 3.14, math.pi])
+def test_an_arc_is_that_of_the_c_library(angle):
+    arc = transcendental.arc
+    of = numba.njit(lambda sin, cos: arc(sin, cos), error_model='numpy')
+    sin, cos = abs(math.sin(angle)), math.cos(angle)
+    for size in (1e-100, 1.0, 3e50):
+        assert of(size * sin, size * cos) == pytest.approx(math.atan2(sin, cos), rel=4e-16)
+    for bad in ((math.nan, 1.0), (1.0, math.nan), (0.0, 0.0)):
+        assert math.isnan(of(*bad))
+
+
+@pytest.mark.parametrize('x', [0.0, -1e-300, -1e-17, -1e-5, -0.3, -0.34, -0.35, -1.0, -30.0, -700.0,
+                               -800.0, -math.inf])
+def test_the_exponential_of_what_decays(x):
+    exp_minus = transcendental.exp_minus
+    of = numba.njit(lambda x: exp_minus(x), error_model='numpy')
+    assert of(x) == pytest.approx((math.exp(x), math.expm1(x)), rel=4e-16, abs=0)

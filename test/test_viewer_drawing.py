@@ -32,7 +32,13 @@ from ragdoll_ros.viewer.drawing.bodies import Bodies
 from ragdoll_ros.viewer.drawing.joint_balls import joint_balls
 from ragdoll_ros.viewer.drawing.joint_limits import ARC_SEGMENTS, RIM, SPOKES, JointLimits
 from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, SEGMENTS
-from ragdoll_ros.viewer.drawing.overlays import LABEL_GAP, MOST_LABELS, apart, arrow_to_surface, force_arrows
+from ragdoll_ros.viewer.drawing.overlays import (
+    LABEL_GAP,
+    MOST_LABELS,
+    apart,
+    arrow_to_surface,
+    force_arrows,
+)
 from ragdoll_ros.viewer.drawing.skin_meshes import SkinMeshes
 from ragdoll_ros.viewer.drawing.stage import CELL, FADE, grid_size
 from ragdoll_ros.viewer.pointer import nearest_bone, target_at_distance, to_bone_frame
@@ -217,8 +223,7 @@ def test_no_arrow_where_a_source_knows_no_forces():
 
 @pytest.mark.parametrize('count', [0, 1, 2, 3, 5, 6, 8, 12, 40])
 def test_labels_do_not_lie_on_stronger_ones(count):
-    """Each tip has a label, or is near one that is stronger, or there are as many as there may be.
-    """
+    """Each tip has one, or lies near a stronger one that has, or there are as many as may be."""
     tips = np.random.default_rng(count).uniform(0, 1, (count, 3)) * (1, 1, 0.1)
     labelled = apart(tips)
     assert sorted(labelled) == labelled and len(labelled) <= MOST_LABELS

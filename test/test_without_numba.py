@@ -49,6 +49,27 @@ than 0.1 %, where plain PyBullet makes 30 J. A hang by a hand, and a fall."""
 GONE = "import sys; sys.modules['numba'] = None\n"
 
 
+HAIR = """
+import numpy as np
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model.rotation import from_rotation_vector
+from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.swing.mount import mount_swings
+from ragdoll_ros.physics.swing.swings import Swings
+scene = load_scene('ponytail')
+def motion(t):
+    turn = np.outer(np.ones(10), [0.2, 0.1, 0.3])
+    return State(turn * np.sin(9 * t), from_rotation_vector(turn * np.sin(9 * t)),
+                 9 * turn * np.cos(9 * t), 9 * turn * np.cos(9 * t))
+swings = Swings(mount_swings(scene), scene.gravity, motion)
+for index in range(20):
+    state = swings.evaluate(index / 60)
+print(np.round(state.positions, 9).tolist(), np.round(state.orientations, 9).tolist())
+"""
+"""A ponytail on a head that shakes, at times that are none of its grid. To the last bit, turns of
+the head are not the same without machine code."""
+
+
 def told(code, **environment):
     """Last line of what a process of its own prints."""
     path = os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')])
@@ -64,6 +85,10 @@ def test_it_does_without_numba():
 
 def test_it_does_where_numba_is_told_to_rest():
     assert told(FALL, NUMBA_DISABLE_JIT='1') == 'bullet NUMBA_DISABLE_JIT is set'
+
+
+def test_hair_swings_alike_without_numba():
+    assert told(GONE + HAIR) == told(HAIR) == told(HAIR, NUMBA_DISABLE_JIT='1')
 
 
 @pytest.mark.parametrize('error', ['ImportError', 'AttributeError', 'SystemError'])

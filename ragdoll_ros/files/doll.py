@@ -235,6 +235,8 @@ def _swing_data(swing: Swing) -> dict:
             'direction': list(swing.direction), 'gravity': swing.gravity, 'mode': swing.mode}
     if any(swing.velocity):
         data['velocity'] = list(swing.velocity)
+    if swing.independent:
+        data['independent'] = True
     data['links'] = [_link_data(link) for link in swing.links]
     return data
 

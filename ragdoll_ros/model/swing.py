@@ -5,8 +5,8 @@ Frozen, validated data. SI units; points and directions are in the doll's frame,
 - ``stiffness`` k, N m/rad: the torque on a link is k times the angle to its rest direction. The
   first link's rest direction is fixed in the bone, each further one's in the link before it.
 - ``damping`` zeta, a ratio: the torque is -2 zeta J sqrt(k/J + gravity g/reach) times the angular
-  rate relative to the same frame, with J and reach as in swings.py (m l^2 and l for a single
-  mass). 1 is critical where gravity acts along the rest direction, overdamped elsewhere.
+  rate relative to the same frame, with J and reach as in physics/swing/chains.py (m l^2 and l for a
+  single mass). 1 is critical where gravity acts along the rest direction, overdamped elsewhere.
 - ``gravity``: factor of the scene's gravity; 0 for none, negative values rise.
 
 The masses have full inertia in the world frame: the bone's motion acts on them.
@@ -56,7 +56,8 @@ class Swing:
 
     ``mode``: 'spring' (links return to their rest directions), 'pendulum' (no springs), 'free'
     (no rods: each mass falls from its rest position with ``velocity`` m/s, world axes, which only
-    this mode has).
+    this mode has). ``independent``: each link swings as if nothing hung on it, as the spring bones
+    of VRM do; else it carries the masses beyond it.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Swing:
     gravity: float = 1.0
     mode: str = 'spring'
     velocity: Vector = (0.0, 0.0, 0.0)
+    independent: bool = False
 
     def __post_init__(self) -> None:
         set_fields(self, root=finite_floats('root', self.root),
@@ -81,6 +83,8 @@ class Swing:
             if self.mode != 'spring' and link.stiffness:
                 raise errors.WrongForm(f'links[{index}].stiffness', link.stiffness,
                                        f'0 for a {self.mode}, or mode: spring')
+        if not isinstance(self.independent, bool):
+            raise errors.WrongForm('independent', self.independent, 'true or false')
         if self.mode != 'free' and any(self.velocity):
             raise errors.WrongForm('velocity', self.velocity, 'none, or mode: free')
 
@@ -90,13 +94,24 @@ class Swing:
 
 
 def strand(links: int, length: float, mass: float = 0.1,
-           stiffness: float | tuple[float, float] = 0.0, damping: float = 0.0) -> tuple[Link, ...]:
+           stiffness: float | tuple[float, float] = 0.0, damping: float = 0.0,
+           rigidity: float | None = None) -> tuple[Link, ...]:
     """``links`` equal links that share ``length`` m and ``mass`` kg.
 
-    ``stiffness`` (N m/rad) is linear from root to tip; one number is both.
+    ``stiffness`` (N m/rad) is linear from root to tip; one number is both. Or ``rigidity`` E I
+    (N m^2) of a uniform strap that is clamped at its root: springs of E I links/length, but twice
+    that at the root; half a link's mass is the root's. The lowest frequency is then 5 % below the
+    strap's for 4 links, 1.3 % for 8.
     """
     errors.check_range('links', links, 1, 1000)
-    root, tip = stiffness if isinstance(stiffness, (tuple, list)) else (stiffness, stiffness)
-    along = [index / max(links - 1, 1) for index in range(links)]
-    return tuple(Link(length / links, mass / links, root + (tip - root) * part, damping)
-                 for part in along)
+    if rigidity is not None:
+        if stiffness:
+            raise errors.WrongForm('rigidity', rigidity, 'none beside a stiffness')
+        springs = [rigidity * links / length * (1 + (index == 0)) for index in range(links)]
+        masses = [mass / links * (1 - (index == links - 1) / 2) for index in range(links)]
+    else:
+        root, tip = stiffness if isinstance(stiffness, (tuple, list)) else (stiffness, stiffness)
+        springs = [root + (tip - root) * index / max(links - 1, 1) for index in range(links)]
+        masses = [mass / links] * links
+    return tuple(Link(length / links, *of_one, damping)
+                 for of_one in zip(masses, springs, strict=True))

@@ -5,7 +5,7 @@ import os
 import warnings
 from collections.abc import Sequence
 from functools import cached_property, partial
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -26,7 +26,9 @@ from .rigid_body import GroundHeights, JointGap
 from .sleeping import SleepDetector
 from .stability import StabilityTest
 from .swing.pose import SwingState
-from .swing.swings import SwingSimulation
+
+if TYPE_CHECKING:
+    from .swing.swings import SwingSimulation
 
 MAX_SAMPLES_PER_TICK = 200  # those of a sensor of 1 kHz in the longest tick
 MAX_WORKERS = 64  # threads, each with its own workspace
@@ -92,8 +94,7 @@ class Simulation:
         self._placed: GeneralizedState | None = None
         self._start = self._engine.save()
         self._sleep_detector, self._stability_test = SleepDetector(scene), StabilityTest(scene)
-        self._swings = SwingSimulation(scene) if any(
-            placement.doll.swings for placement in scene.dolls) else None
+        self._swings = _swings(scene)
         self.reset()
 
     def __enter__(self) -> Simulation:
@@ -519,6 +520,15 @@ class Simulation:
     def _springs(self) -> Springs:
         """Springs of hands and of joint angles."""
         return self._hands.springs + self._joint_springs.springs
+
+
+def _swings(scene: Scene) -> SwingSimulation | None:
+    """The swings of a scene, if it has any."""
+    if not any(placement.doll.swings for placement in scene.dolls):
+        return None
+    # Imported here: its kernels are compiled, or loaded, for few scenes.
+    from .swing.swings import SwingSimulation
+    return SwingSimulation(scene)
 
 
 class _ClosedEngine:

@@ -8,9 +8,9 @@ l (VRMC_springBone 1.0, "SpringBone Algorithm"; both are speeds, m/s). For a sma
 
 so the modes per frame are the roots z of (1 + e) z^2 - (2 - drag) z + 1 - drag = 0. The swing has
 the eigenvalues log(z)/dt: at FRAME_RATE, and for a single segment, its angles equal VRM's at every
-frame. k/J is the product of the eigenvalues, and 2 zeta sqrt(k/J + share g/reach) minus their sum,
-as chain.py defines them. The gravity share keeps the equilibrium angle of gravity and stiffness;
-the swing has one share, the mean over the chain.
+frame. k/J is the product of the eigenvalues, and 2 zeta sqrt(k/J + share g/l) minus their sum, with
+J = m l^2, as each segment swings as if none hung on it. The gravity share keeps the equilibrium
+angle of gravity and stiffness; the swing has one share, the mean over the chain.
 
 Differences: VRM's drag is relative to the world (or the spring's ``center``), a swing's damping to
 the body; the restoring torque at large angles is proportional to the angle, not to its sine.
@@ -47,21 +47,20 @@ def swing_from_spring(spring: SpringBone, bone: str, metres: float) -> tuple[Swi
     masses = LINEAR_DENSITY * lengths
     rates = [_rates(joint, length, metres)
              for joint, length in zip(spring.joints, lengths, strict=True)]
-    distal = [_distal_moments(lengths[index:], masses[index:]) for index in range(len(lengths))]
-    reaches = [inertia / lever for inertia, lever in distal]
-    shares = [joint.gravity / max(joint.stiffness, MIN_STIFFNESS / metres) * stiff * reach
-              for joint, (stiff, _), reach in zip(spring.joints, rates, reaches, strict=True)]
+    shares = [joint.gravity / max(joint.stiffness, MIN_STIFFNESS / metres) * stiff * length
+              for joint, (stiff, _), length in zip(spring.joints, rates, lengths, strict=True)]
     target = float(np.mean(shares)) / GRAVITY
     share = min(max(target, -MAX_GRAVITY), MAX_GRAVITY)
     links = []
     for index, (stiff, damping) in enumerate(rates):
-        natural_rate = math.sqrt(stiff + abs(share) * GRAVITY / reaches[index])
+        natural_rate = math.sqrt(stiff + abs(share) * GRAVITY / lengths[index])
         links.append(Link(_round(lengths[index]), _round(masses[index]),
-                          _round(distal[index][0] * stiff),
+                          _round(masses[index] * lengths[index] ** 2 * stiff),
                           _round(min(damping / (2 * natural_rate), MAX_DAMPING)),
                           tuple(steps[index] / lengths[index])))
     root = tuple(round(float(x), 10) for x in spring.points[0])
-    swing = Swing(spring.name, bone, root, links[0].direction, tuple(links), _round(share))
+    swing = Swing(spring.name, bone, root, links[0].direction, tuple(links), _round(share),
+                  independent=True)
     return swing, share != target
 
 
@@ -76,12 +75,6 @@ def _rates(joint: SpringJoint, length: float, metres: float = 1.0) -> tuple[floa
     root = cmath.sqrt(half * half - product)
     first, second = (FRAME_RATE * cmath.log(z) for z in (half + root, half - root))
     return (first * second).real, max(-(first + second).real, 0.0)
-
-
-def _distal_moments(lengths: np.ndarray, masses: np.ndarray) -> tuple[float, float]:
-    """Moment of inertia (kg m^2) and static moment (kg m) about a segment's root, of its chain."""
-    distances = np.cumsum(lengths)
-    return float(masses @ distances ** 2), float(masses @ distances)
 
 
 def _round(value: float) -> float:

@@ -1,26 +1,7 @@
 """Kernels: machine code, compiled by numba at the first import; ready() tells whether it can be."""
-from __future__ import annotations
+from .compiling.available import problem, ready
 
-import functools
-import os
+__all__ = ['ORDER', 'problem', 'ready']
 
 ORDER = 8
 """Order of the Runge-Kutta method of flight."""
-
-
-@functools.cache
-def problem() -> str:
-    """Why the kernels cannot be compiled; empty if they can."""
-    if os.environ.get('NUMBA_DISABLE_JIT', '0') not in ('', '0'):
-        return 'NUMBA_DISABLE_JIT is set'
-    try:
-        import numba  # noqa: F401
-    except Exception as error:  # whatever one raises that fits neither numpy nor Python
-        return ('numba is missing' if getattr(error, 'name', None) == 'numba'
-                else f'numba does not work here: {error}')
-    return ''
-
-
-def ready() -> bool:
-    """Whether the kernels can be compiled."""
-    return not problem()

@@ -26,6 +26,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     began = time.monotonic()
     from . import loaded  # noqa: F401  importing compiles
+    from .swing import loaded as swings  # noqa: F401
     from .compiling import cache
     is_kept = cache.KEPT and cache.KernelCache.failure is None
     kept = f'kept in {cache.FOLDER}' if is_kept else 'kept nowhere'

@@ -9,48 +9,39 @@ import numpy as np
 
 from ...model import rotation
 from ...model.state import State
-from .links import Level, Links
-from .mount import SwingMount
-from .sphere import cross, dot
+from .mount import SwingMount, each_link
 
 
 @dataclass(frozen=True)
 class MassIndex:
-    """Maps levels and free masses to the scene's order of m masses: by swing, root to tip."""
+    """Places of the links of chains and of the free masses in the scene's order of m masses: by
+    swing, root to tip.
+    """
 
     chained: np.ndarray
-    """Indices of the chained masses, level by level."""
+    """(k,) of each link of the chains."""
     free: np.ndarray
-    """Indices of the free masses."""
+    """(f,) of each free mass."""
     bone: np.ndarray
-    """(m,) index of each mass's bone."""
+    """(m,) row of each mass's bone."""
+    number: np.ndarray
+    """(k,) of each link in its chain, from 0 at the root."""
 
     @classmethod
-    def of(cls, mounted: Sequence[SwingMount], chains: Sequence[SwingMount]) -> MassIndex:
-        """Make the index of mounted swings, of which ``chains`` are not free."""
-        begins, count = {}, 0
-        for mount in mounted:
-            begins[id(mount)] = count
-            count += len(mount.swing.links)
-        depth = len(chains[0].swing.links) if chains else 0
-        chained = [begins[id(mount)] + level for level in range(depth)
-                   for mount in chains if len(mount.swing.links) > level]
-        bone = [mount.bone for mount in mounted for _ in mount.swing.links]
-        free = np.setdiff1d(np.arange(count), chained)
-        return cls(np.array(chained, int), free, np.array(bone, int))
+    def of(cls, mounted: Sequence[SwingMount]) -> MassIndex:
+        """Make the index of mounted swings."""
+        is_free = np.array([mount.swing.mode == 'free' for mount, _ in each_link(mounted)], bool)
+        numbers = np.array([index for _, index in each_link(mounted)], int)
+        return cls(np.flatnonzero(~is_free), np.flatnonzero(is_free),
+                   np.array([mount.bone for mount, _ in each_link(mounted)], int),
+                   numbers[~is_free])
 
-    @cached_property
-    def is_identity(self) -> bool:
-        """Whether the only level has all masses in the scene's order."""
-        return np.array_equal(self.chained, np.arange(len(self.bone)))
-
-    def gather(self, chained: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
-        """Rows (m, k) in the scene's order from the levels' (k, n) and the free masses' (f, k)."""
-        if len(chained) == 1 and self.is_identity:
-            return chained[0].T
+    def gather(self, chained: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """Rows (m, n) in the scene's order from the links' (k, n) and the free masses' (f, n)."""
+        if not len(self.free):
+            return chained
         out = np.empty((len(self.bone), free.shape[1]))
-        if chained:
-            out[self.chained] = np.concatenate(chained, axis=1).T
+        out[self.chained] = chained
         out[self.free] = free
         return out
 
@@ -74,16 +65,17 @@ class SwingState:
 
     time: float
     bones: State
-    levels: Sequence[Level] = field(repr=False)
-    links: Sequence[Links] = field(repr=False)
+    links: np.ndarray = field(repr=False)
+    """Records LINK of the chains' links, and LINK_STATE."""
+    link_states: np.ndarray = field(repr=False)
     free: FreeMasses = field(repr=False)
     mass_index: MassIndex = field(repr=False)
 
     @cached_property
     def positions(self) -> np.ndarray:
         """Positions (m, 3) m, world frame."""
-        tips = [links.base.point + level.length * links.direction
-                for level, links in zip(self.levels, self.links, strict=True)]
+        tips = (self.link_states['point']
+                + self.links['length'][:, None] * self.link_states['direction'])
         return self.mass_index.gather(tips, self.free.positions)
 
     @property
@@ -94,40 +86,41 @@ class SwingState:
     @cached_property
     def velocities(self) -> np.ndarray:
         """Velocities (m, 3) m/s, world frame."""
-        tips = [links.base.velocity + level.length * links.rate
-                for level, links in zip(self.levels, self.links, strict=True)]
+        tips = (self.link_states['velocity']
+                + self.links['length'][:, None] * self.link_states['rate'])
         return self.mass_index.gather(tips, self.free.velocities)
 
     @cached_property
     def roots(self) -> np.ndarray:
         """Roots of the rods (m, 3) m, world frame; a free mass's own position."""
-        points = [links.base.point for links in self.links]
-        return self.mass_index.gather(points, self.free.positions)
+        return self.mass_index.gather(self.link_states['point'], self.free.positions)
 
     @cached_property
     def directions(self) -> np.ndarray:
         """Unit vectors along the rods (m, 3), world frame; zero for free masses."""
-        return self.mass_index.gather([links.direction for links in self.links],
-                                 np.zeros_like(self.free.positions))
+        return self.mass_index.gather(self.link_states['direction'],
+                                      np.zeros_like(self.free.positions))
 
     @cached_property
     def rates(self) -> np.ndarray:
         """Time derivatives of the directions (m, 3) 1/s, world frame."""
-        return self.mass_index.gather([links.rate for links in self.links],
-                                 np.zeros_like(self.free.positions))
+        return self.mass_index.gather(self.link_states['rate'],
+                                      np.zeros_like(self.free.positions))
 
     @cached_property
     def orientations(self) -> np.ndarray:
         """Unit quaternions x, y, z, w (m, 4), world frame."""
-        turns: list[np.ndarray] = []
-        begin = 0
-        for level, links in zip(self.levels, self.links, strict=True):
-            count = len(level.length)
-            bones = self.mass_index.bone[self.mass_index.chained[begin:begin + count]]
-            frame = turns[-1][:, :count].T if turns else self.bones.orientations[bones]
-            n = links.base.outward(level.rest)
-            arcs = np.vstack([cross(n, links.direction), 1 + dot(n, links.direction)])
-            arcs[0, np.sum(arcs * arcs, axis=0) < 1e-24] = 1
-            turns.append(rotation.multiply(rotation.normalized(arcs.T), frame).T)
-            begin += count
-        return self.mass_index.gather(turns, self.free.orientations)
+        # Columns of a link's rotation are its frame's axes.
+        rest = np.einsum('kji,kj->ki', self.link_states['axes'], self.links['rest'])
+        d = self.link_states['direction']
+        arcs = np.column_stack([np.cross(rest, d), 1 + np.einsum('ki,ki->k', rest, d)])
+        arcs[np.einsum('ki,ki->k', arcs, arcs) < 1e-24, 0] = 1
+        turns = rotation.normalized(arcs)
+        index = self.mass_index
+        out = self.bones.orientations[index.bone[index.chained]]
+        for number in range(max(index.number, default=-1) + 1):
+            own = np.flatnonzero(index.number == number)
+            if number:
+                out[own] = out[own - 1]
+            out[own] = rotation.multiply(turns[own], out[own])
+        return index.gather(out, self.free.orientations)

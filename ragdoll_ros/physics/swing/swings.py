@@ -4,12 +4,11 @@ Integration uses a fixed time grid that begins at the start. The state between t
 one shorter step from the last of them, which is then discarded. So a state depends on the start,
 the time and the bones' motion only, not on which other times were evaluated.
 
-Chains are integrated from root to tip: each link hangs from the mass before it and carries the
-masses beyond it as if they were in line (links.py). Other motion of those masses has no effect on
-it. This is exact for single masses only. Error of the lowest frequency at small angles, for n equal
-links: under gravity +1.2 % (n = 2), +1.8 % (n = 8); with springs alone +8 % (n = 2), +27 % (4),
-+60 % (8), +110 % (16). Energy of an undamped chain is not conserved: hair needs a damping of 0.3 or
-more. With less, a strand that is shaken hard moves chaotically.
+Chains are integrated from root to tip: each link hangs from the mass before it, whose motion drives
+it, and carries the masses beyond it as an inertia with which its own frequency is that of the true
+chain (chains.py). Their other motion has no effect on it. This is exact for single masses only.
+Energy of an undamped chain is not conserved: hair needs a damping of 0.3 or more, and few links.
+With less, a strand that is shaken hard moves chaotically.
 """
 import dataclasses
 import math
@@ -20,19 +19,18 @@ import numpy as np
 from ...model import rotation
 from ...model.scene import SECOND, Scene
 from ...model.state import State
-from .links import BaseFrames, Links, Step
-from .mount import Roots, SwingMount, levels, mount_swings
+from ..kernels.compiling.decorators import rows_of
+from ..kernels.swing.links import LINK_STATE, RESPONSE, Chains
+from ..kernels.swing.loaded import advance_chains
+from .chains import make_links
+from .mount import SwingMount, mount_swings
 from .pose import FreeMasses, MassIndex, SwingState
-from .sphere import dot
 from .track import Track
 
 LONGEST_STEP = 0.01
 """s: coarsest grid, sufficient for bone motions up to about 15 Hz."""
 LARGEST_PHASE = 0.1
 """rad: phase of the fastest pendulum in one grid interval; gives periods correct to 0.05 %."""
-LARGEST_FORCED_PHASE = 0.5
-"""rad: phase of a pendulum under its root's acceleration above which a step is divided."""
-MAX_SUBSTEPS = 64
 _ROUNDING = 1e-9
 
 
@@ -48,14 +46,17 @@ class Swings:
         self.names = [name for mount in mounted for name in mount.names]
         self.motion = motion
         gravity = np.array(gravity, float)
-        chains = [mount for mount in mounted if mount.swing.mode != 'free']
-        chains.sort(key=lambda mount: -len(mount.swing.links))
-        self._roots = Roots.of(chains)
-        self._levels = levels(chains, gravity)
         self._free = _FreeFall([mount for mount in mounted if mount.swing.mode == 'free'], gravity)
-        self._mass_index = MassIndex.of(mounted, chains)
-        self.step = step or self._grid()
-        self._steps: dict[float, list[Step]] = {}
+        self._mass_index = MassIndex.of(mounted)
+        bones = max((mount.bone for mount in mounted), default=-1) + 1
+        chains = [mount for mount in mounted if mount.swing.mode != 'free']
+        links = make_links(chains, gravity)
+        self.step = step or _grid(links)
+        ends = np.cumsum([len(mount.swing.links) for mount in chains], dtype=np.int64)
+        self._chains = Chains(links, np.append(0, ends)[:-1], ends, rows_of(RESPONSE, len(links)),
+                              rows_of(RESPONSE, len(links)), np.zeros((bones, 13)))
+        advance_chains.set_responses(links, self.step, self._chains.responses)
+        self._states = rows_of(LINK_STATE, len(links))
         self._begin: float | None = None
 
     def evaluate(self, time: float) -> SwingState:
@@ -69,14 +70,19 @@ class Swings:
         elif time == self._time:
             return self._last
         whole = math.floor((time - self._begin) / self.step + _ROUNDING)
-        for index in range(self._count, whole):
-            self._now = self._advance(self._now, self._instant(index),
-                                      self._instant(index + 1), self.step)
-        self._count, self._time = whole, time
         remainder = time - self._instant(whole)
-        now = self._now
-        if remainder > _ROUNDING * self.step:
-            now = self._advance(now, self._instant(whole), time, remainder)
+        if remainder <= _ROUNDING * self.step:
+            remainder = 0.0
+        now = self._states
+        if len(now):
+            times, rows = self._path(self._count, whole, time if remainder else None)
+            advance_chains.advance_chains(self._chains, now, times, rows, self._begin, self._count,
+                                          whole, self.step)
+            if remainder:
+                now = _copy(now)
+                advance_chains.advance_chains(self._chains, now, times, rows, self._instant(whole),
+                                              0, 1, remainder)
+        self._count, self._time = whole, time
         self._last = self._state(now, time)
         return self._last
 
@@ -90,68 +96,45 @@ class Swings:
         bones = self.motion(time)
         self._begin = self._time = time
         self._count = 0
-        self._now = []
-        base = self._roots.frames(bones)
-        offset = 0
-        for level in self._levels:
-            count = len(level.length)
-            rows = self._mass_index.chained[offset:offset + count]
-            base = _take(base, count)
-            pointing = (base.outward(level.rest) if directions is None
-                        else rotation.normalized(np.asarray(directions)[rows]).T)
-            rate = None if rates is None else np.asarray(rates, float)[rows].T
-            self._now.append(Links.at(base, level.rest, np.ascontiguousarray(pointing), rate))
-            base = level.tips(self._now[-1])
-            offset += count
+        chained = self._mass_index.chained
+        if directions is not None:
+            self._states['direction'] = rotation.normalized(np.asarray(directions)[chained])
+        if rates is not None:
+            self._states['rate'] = np.asarray(rates, float)[chained]
+        advance_chains.begin_chains(
+            self._chains, self._states, bones.rows, directions is not None, rates is not None)
         self._free.begin(time, bones)
-        self._last = self._state(self._now, time)
-
-    def _grid(self) -> float:
-        fastest = max((math.sqrt(np.max(np.linalg.norm(level.gravity, axis=0) / level.reach))
-                        for level in self._levels), default=0.0)
-        return LONGEST_STEP / max(1, math.ceil(LONGEST_STEP * fastest / LARGEST_PHASE))
+        self._last = self._state(self._states, time)
 
     def _instant(self, index: int) -> float:
         return self._begin + index * self.step
 
-    def _advance(self, now: list[Links], begin: float, end: float, h: float) -> list[Links]:
-        """Integrate over h s, in several steps where the roots' acceleration is large."""
-        if not self._levels:
-            return now
-        base = self._roots.frames(self.motion(end))
-        forces = self._levels[0].forces(now[0].base, base, h)
-        substeps = _substep_count(forces, h)
-        if substeps == 1:
-            return self._swing(now, base, h, forces)
-        for index in range(1, substeps):
-            between = self._roots.frames(self.motion(begin + h * index / substeps))
-            now = self._swing(now, between, h / substeps)
-        return self._swing(now, base, h / substeps)
+    def _path(self, first: int, last: int, end: float | None) -> tuple[np.ndarray, np.ndarray]:
+        """Times (k,) and states (k, b, 13) of the bones from one point of the grid to another, or
+        to ``end`` s.
+        """
+        if isinstance(self.motion, Track):
+            return self.motion.states(self._instant(first),
+                                      self._instant(last) if end is None else end)
+        times = [self._instant(index) for index in range(first, last + 1)]
+        if end is not None:
+            times.append(end)
+        return np.array(times), np.array([self.motion(time).rows for time in times])
 
-    def _swing(self, now: list[Links], base: BaseFrames, h: float,
-               forces: tuple[np.ndarray, np.ndarray] | None = None) -> list[Links]:
-        """Integrate all levels, root to tip, over one step."""
-        then: list[Links] = []
-        for level, links, step in zip(self._levels, now, self._factors(h), strict=True):
-            if then:
-                base = _take(self._levels[len(then) - 1].tips(then[-1]), len(level.length))
-                forces = None
-            forces = forces or level.forces(links.base, base, h)
-            swung = level.swing(links, base, step, forces)
-            then.append(_limit_rates(swung, math.pi / self.step) if then else swung)
-        return then
+    def _state(self, states: np.ndarray, time: float) -> SwingState:
+        return SwingState(time, self.motion(time), self._chains.links, _copy(states),
+                          self._free.at(time), self._mass_index)
 
-    def _factors(self, h: float) -> list[Step]:
-        """Coefficients of each level for step h, from a cache."""
-        if h not in self._steps:
-            if len(self._steps) >= MAX_SUBSTEPS:
-                self._steps.clear()
-            self._steps[h] = [Step(level, h) for level in self._levels]
-        return self._steps[h]
 
-    def _state(self, now: list[Links], time: float) -> SwingState:
-        return SwingState(time, self.motion(time), self._levels, now, self._free.at(time),
-                          self._mass_index)
+def _copy(states: np.ndarray) -> np.ndarray:
+    """Copy of records of numbers, at once: NumPy copies records field by field."""
+    return states.view(float).copy().view(states.dtype)
+
+
+def _grid(links: np.ndarray) -> float:
+    """Interval of the grid, s: LONGEST_STEP over the smallest sufficient whole number."""
+    fastest = math.sqrt(max(np.linalg.norm(links['gravity'], axis=1), default=0.0))
+    return LONGEST_STEP / max(1, math.ceil(LONGEST_STEP * fastest / LARGEST_PHASE))
 
 
 _NO_MASSES = FreeMasses(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 4)))
@@ -189,38 +172,6 @@ class _FreeFall:
 def _rods(mount: SwingMount) -> np.ndarray:
     lengths = np.array([link.length for link in mount.swing.links])
     return np.cumsum(mount.directions * lengths[:, None], axis=0)
-
-
-def _substep_count(forces: tuple[np.ndarray, np.ndarray], h: float) -> int:
-    """Number of steps into which to divide h under these forces."""
-    most = (LARGEST_FORCED_PHASE / h) ** 4
-    # The sum of all squares is cheap, and seldom above the bound for one. BLAS would be slower: its
-    # threads spin after each sum.
-    if all(np.einsum('in,in', force, force) <= most for force in forces):
-        return 1
-    sharpest = max(float(np.max(dot(force, force))) for force in forces)
-    return min(max(math.ceil((sharpest / most) ** 0.25), 1), MAX_SUBSTEPS)
-
-
-def _take(base: BaseFrames, count: int) -> BaseFrames:
-    """The first ``count`` frames."""
-    if base.point.shape[1] == count:
-        return base
-    return BaseFrames(base.point[:, :count], base.velocity[:, :count], base.axes[:, :, :count],
-                base.spin[:, :count])
-
-
-def _limit_rates(links: Links, most: float) -> Links:
-    """Limit the rates of links below the first level to ``most`` rad/s.
-
-    The next level cannot resolve more than half a turn in a grid interval: without the limit an
-    undamped chain gains energy from aliasing.
-    """
-    squares = dot(links.rate, links.rate)
-    if np.max(squares) <= most * most:
-        return links
-    factor = np.minimum(1, most / np.sqrt(np.maximum(squares, most * most)))
-    return Links(links.base, links.direction, links.rate * factor, links.pull, links.drift)
 
 
 class SwingSimulation:

@@ -1,4 +1,4 @@
-"""Sine, cosine and inverse hyperbolic sine, of sums, products and roots alone.
+"""Sine, cosine, arc, exponential and inverse hyperbolic sine, of sums, products and roots alone.
 
 Those of a C library differ in the last bit between libraries, and within one between processors,
 where it uses fused multiply-add. These are the same bits everywhere.
@@ -6,6 +6,8 @@ where it uses fused multiply-add. These are the same bits everywhere.
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ..compiling.decorators import compiled
 
@@ -16,6 +18,17 @@ S3, S5, S7, S9, S11, S13, S15, S17 = (
     (-1) ** k / math.factorial(2 * k + 1) for k in range(1, 9))
 C4, C6, C8, C10, C12, C14, C16, C18 = ((-1) ** k / math.factorial(2 * k) for k in range(2, 10))
 """Taylor coefficients: within pi / 4 the next ones are below rounding."""
+
+
+_MIDDLES = (np.arange(1, 32) + 0.5) / 16
+NODE = np.array([0.0, *np.arctan2(1 - abs(1 - _MIDDLES), 1 - _MIDDLES), math.pi])
+NODE_SIN, NODE_COS = np.sin(NODE), np.cos(NODE)
+"""Angles, rad: 0, and of the middles of 31 equal pieces of the way from (1, 0) by (0, 1) to
+(-1, 0)."""
+
+LN2 = math.log(2)
+LN2_HIGH, LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
+"""ln 2, and in two parts; a whole number of up to 2**20 times the first one is not rounded."""
 
 
 @compiled
@@ -56,3 +69,33 @@ def asinh(x: float) -> float:
     z = x * x
     return share * (x - x * z * (1 / 6 - z * (3 / 40 - z * (15 / 336 - z * (
         105 / 3456 - z * (945 / 42240 - z * (10395 / 599040)))))))
+
+
+@compiled
+def arc(sin: float, cos: float) -> float:
+    """Angle, rad in [0, pi], whose sine and cosine are in this proportion; ``sin`` >= 0, not both
+    0. It is that of a node nearby, and the arc tangent of the rest, at most 0.07.
+    """
+    past_right = sin / (sin + abs(cos)) if cos > 0 else 2 - sin / (sin - cos)
+    node = int(past_right * 16) if past_right >= 0 else 0  # not of NaN
+    rest = ((sin * NODE_COS[node] - cos * NODE_SIN[node])
+            / (cos * NODE_COS[node] + sin * NODE_SIN[node]))
+    z = rest * rest
+    u = z * z
+    series = (1 / 3 - z / 5) + u * ((1 / 7 - z / 9) + u * (1 / 11 - z / 13))
+    return NODE[node] + (rest - rest * z * series)
+
+
+@compiled
+def exp_minus(x: float) -> tuple[float, float]:
+    """e^x and e^x - 1 of a number x <= 0; error of both 2e-16 of the value."""
+    if x < -745:
+        return 0.0, -1.0
+    doublings = math.floor(x * (1 / LN2) + 0.5)
+    rest = (x - doublings * LN2_HIGH) - doublings * LN2_LOW
+    total = 1.0
+    for k in range(13, 1, -1):
+        total = 1 + total * rest / k
+    small = rest * total
+    value = math.ldexp(1 + small, int(doublings))
+    return value, small if doublings == 0 else value - 1

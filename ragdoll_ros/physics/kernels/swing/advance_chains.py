@@ -1,0 +1,153 @@
+"""Advance all chains of a scene over a grid of time, root to tip.
+
+The state at a time between two points of the grid is one shorter step from the last of them, which
+is then discarded: a state depends on the start, the time and the bones' motion, not on which other
+knots were asked for.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiling.decorators import compiled, entry, inlined, type_like
+from ..maths.vectors import Vec3, dot, put, vec
+from .bone_path import interpolate_state
+from .link_step import (limited, outward, place, root_forces, root_frame, set_response, step_link,
+                        tip_frame)
+from .links import LINK, LINK_STATE, RESPONSE, Chains, Frame
+
+MAX_SUBSTEPS = 64
+
+CHAINS = type_like(Chains(
+    np.zeros(0, LINK), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, RESPONSE),
+    np.zeros(0, RESPONSE), np.zeros((0, 13))))
+LINKS, STATES, RESPONSES = (type_like(np.zeros(0, kind)) for kind in (LINK, LINK_STATE, RESPONSE))
+KNOTS, BONES, ROWS = (type_like(np.zeros((0,) * dimensions)) for dimensions in (1, 2, 3))
+NUMBER, INDEX, FLAG = (type_like(value) for value in (0.0, 0, False))
+
+
+@compiled
+def set_bones(time: float, knots: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+    """See bones_at()."""
+    after = np.searchsorted(knots, time)
+    if after == len(knots) or knots[after] == time or after == 0:
+        known = min(after, len(knots) - 1)
+        for bone in range(len(out)):
+            for k in range(13):
+                out[bone, k] = rows[known, bone, k]
+        return
+    span = knots[after] - knots[after - 1]
+    part = (time - knots[after - 1]) / span
+    for bone in range(len(out)):
+        interpolate_state(rows[after - 1, bone], rows[after, bone], span, part, out[bone])
+
+
+@compiled
+def bone_at(time: float, knots: np.ndarray, rows: np.ndarray, bone: int) -> np.ndarray:
+    """State (13,) of one bone; see bones_at()."""
+    out = np.empty((1, 13))
+    set_bones(time, knots, rows[:, bone:bone + 1], out)
+    return out[0]
+
+
+@compiled
+def substep_count(forces: tuple[Vec3, Vec3], r: np.ndarray) -> int:
+    """Number of steps into which to divide one of response ``r`` under forces, 1/s^2."""
+    square = max(dot(forces[0], forces[0]), dot(forces[1], forces[1]))
+    if square <= r.largest_square:
+        return 1
+    substeps = math.ceil(math.sqrt(math.sqrt(square / r.largest_square)))
+    return min(int(substeps), MAX_SUBSTEPS)
+
+
+@inlined
+def step_chain(chains: Chains, responses: np.ndarray, states: np.ndarray, start: int, stop: int,
+               frame: Frame, forces: tuple[Vec3, Vec3]) -> None:
+    """Integrate the links from ``start`` to ``stop`` over one step; ``frame``: at the first root at
+    its end; ``forces``: on the first link.
+
+    What hangs on other links turns by at most half a turn in an interval of the grid, the frame at
+    its root too: the next link resolves no more, and an undamped chain would gain energy from
+    aliasing, without end.
+    """
+    most = math.pi / chains.responses[0].h
+    step_link(chains.links[start], responses[start], states[start], frame, forces)
+    for k in range(start + 1, stop):
+        link, state, r = chains.links[k], states[k], responses[k]
+        frame = tip_frame(chains.links[k - 1], states[k - 1], most)
+        step_link(link, r, state, frame, root_forces(link, r, state, frame))
+        put(state.rate, limited(vec(state.rate), most))
+
+
+@compiled
+def part_step(chains: Chains, states: np.ndarray, start: int, stop: int, frame: Frame) -> None:
+    """Integrate a chain over one step of which ``chains.part_responses`` are."""
+    forces = root_forces(chains.links[start], chains.part_responses[start], states[start], frame)
+    step_chain(chains, chains.part_responses, states, start, stop, frame, forces)
+
+
+@entry(LINKS, NUMBER, RESPONSES)
+def set_responses(links: np.ndarray, h: float, responses: np.ndarray) -> None:
+    """Write the responses (m,) of links to a step of ``h`` s."""
+    for k in range(len(links)):
+        set_response(links[k], h, responses[k])
+
+
+@entry(NUMBER, KNOTS, ROWS, BONES)
+def bones_at(time: float, knots: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+    """Write the states (b, 13) of bones at ``time`` s, which are known as ``rows`` (k, b, 13) at
+    ``knots`` (k,) s; constant before the first and after the last.
+    """
+    set_bones(time, knots, rows, out)
+
+
+@entry(CHAINS, STATES, BONES, FLAG, FLAG)
+def begin_chains(chains: Chains, states: np.ndarray, bones: np.ndarray, has_directions: bool,
+                 has_rates: bool) -> None:
+    """Start links (m,) on bones (b, 13), in the directions and with the rates that ``states`` has
+    of them; else in their rest directions, and at rest relative to their frames.
+    """
+    matrix = np.empty((3, 3))
+    for chain in range(len(chains.starts)):
+        for k in range(chains.starts[chain], chains.ends[chain]):
+            link, state = chains.links[k], states[k]
+            if link.parent < 0:
+                frame = root_frame(link, bones[link.bone], matrix)
+            else:
+                frame = tip_frame(chains.links[link.parent], states[link.parent], math.inf)
+            d = vec(state.direction) if has_directions else outward(frame, vec(link.rest))
+            place(link, state, frame, d)
+            if not has_rates:
+                put(state.rate, vec(state.drift))
+
+
+@entry(CHAINS, STATES, KNOTS, ROWS, NUMBER, INDEX, INDEX, NUMBER)
+def advance_chains(chains: Chains, states: np.ndarray, knots: np.ndarray, rows: np.ndarray,
+                   origin: float, begin: int, end: int, h: float) -> None:
+    """Integrate from the instant ``origin`` + ``begin`` h to ``origin`` + ``end`` h, in intervals
+    of ``h`` s.
+    """
+    matrix = np.empty((3, 3))
+    responses = chains.responses
+    if h != responses[0].h:
+        responses = chains.part_responses
+        for k in range(len(states)):
+            set_response(chains.links[k], h, responses[k])
+    for index in range(begin, end):
+        set_bones(origin + (index + 1) * h, knots, rows, chains.roots)
+        for chain in range(len(chains.starts)):
+            start, stop = chains.starts[chain], chains.ends[chain]
+            link = chains.links[start]
+            frame = root_frame(link, chains.roots[link.bone], matrix)
+            forces = root_forces(link, responses[start], states[start], frame)
+            substeps = substep_count(forces, responses[start])
+            if substeps == 1:
+                step_chain(chains, responses, states, start, stop, frame, forces)
+                continue
+            for k in range(start, stop):
+                set_response(chains.links[k], h / substeps, chains.part_responses[k])
+            for part in range(1, substeps):
+                bone = bone_at(origin + (index + part / substeps) * h, knots, rows, link.bone)
+                part_step(chains, states, start, stop, root_frame(link, bone, matrix))
+            part_step(chains, states, start, stop, frame)

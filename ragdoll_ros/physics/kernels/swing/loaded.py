@@ -1,0 +1,17 @@
+"""Imports the kernels of swings, which compiles them, in one process at a time; others load them.
+
+Where numba does not work they are plain Python.
+"""
+import contextlib
+
+from ..compiling.available import ready
+
+if ready():
+    from ..compiling.cache import alone
+else:
+    alone = contextlib.nullcontext
+
+with alone():
+    from . import advance_chains, chain_modes
+
+__all__ = ['advance_chains', 'chain_modes']
