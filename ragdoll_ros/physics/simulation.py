@@ -458,6 +458,13 @@ class Simulation:
             'sinking_m': max(0.0, -float(self._heights(self.state).min())),
             'asleep': self.asleep}
 
+    def ledger(self) -> dict[str, int]:
+        """What the steps of engine rigid since the start are made of: counts of trials, of what was
+        rejected, of contact solves, and cycles of the processor in each stage. See
+        docs/performance.md; empty for other engines.
+        """
+        return self._engine.ledger()
+
     def close(self) -> None:
         """Release the engine; further calls do nothing."""
         self._engine.close()

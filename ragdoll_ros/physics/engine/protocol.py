@@ -243,6 +243,9 @@ class Engine(Protocol):
     def measures(self) -> dict[str, float]:
         """Error measures and counters since the start; keys end in units."""
 
+    def ledger(self) -> dict[str, int]:
+        """What the steps since the start are made of; empty where steps are a library's own."""
+
     def save(self) -> object:
         """Take a snapshot that restore() reproduces to the bit, energy account included."""
 

@@ -37,6 +37,7 @@ import numpy as np
 
 from .cluster_state import CLUSTER_STATE, ClusterState
 from .compiling.bundle import bundle_at
+from .compiling.cycles import cycles
 from .compiling.decorators import ADDRESS, REAL, compiled, entry
 from .contact.gaps import (enable_separated_pairs, label_reachable,
                            update_kinematics_and_gaps)
@@ -102,19 +103,23 @@ def write_bone_states(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
 @compiled
 def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
     """Write the gaps at cluster.q to ws.gaps; step.end becomes the kinematics of q and v."""
+    start_cycles = cycles()
     update_kinematics_and_gaps(s, ws, ws.step.end, cluster.q, cluster.v, ws.gaps, math.inf,
                                ws.gaps)
     ws.stats[0].gaps_current = 1
+    ws.stats[0].ledger.gaps_cycles += cycles() - start_cycles
 
 
 @compiled
 def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nominal: float,
                tolerance: float) -> None:
     """Begin a dense step, with its first contact, if everything separates; ws.gaps are current."""
+    start_cycles = cycles()
     longest = min(left, LONGEST_FLIGHT) if len(cluster.loads) else LONGEST_FLIGHT
     if can_fly(s, ws, cluster, nominal) and begin_dense_step(s, ws, cluster, tolerance, longest):
         find_first_contact(s, ws, cluster)
         ws.stats[0].contact_count = 0
+    ws.stats[0].ledger.flight_cycles += cycles() - start_cycles
 
 
 @compiled
@@ -122,6 +127,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
                     nominal: float, tolerance: float) -> None:
     """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``."""
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
+    start_cycles, ledger = cycles(), ws.stats[0].ledger
     time, impacts, impact_due = 0.0, 0, True
     max_impacts = min(MAX_IMPACTS, IMPACT_WORK // len(s.tree) ** 3)
     if max_impacts < MIN_IMPACTS:
@@ -148,7 +154,9 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
             if flight_possible:
                 try_flight(s, ws, cluster, left, nominal, tolerance)
         if dense.valid:
+            since = cycles()
             gone, touched = follow_dense_step(s, ws, cluster, left)
+            ledger.flight_cycles += cycles() - since
             stats.gaps_current = 0
             if touched:
                 refresh_gaps(s, ws, cluster)
@@ -156,7 +164,9 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
             if not flight_possible or not seek:
                 refresh_gaps(s, ws, cluster)
             h = left / max(1, math.ceil(left / nominal - 1e-9))
+            since = cycles()
             begin_contact_step(s, ws, cluster)
+            ledger.begin_cycles += cycles() - since
             gone, touched = 0.0, seek and impact_due and approaches_fast(s, ws, cluster)
             if not touched:
                 gone, touched = step_to_impact(s, ws, cluster, h, time, nominal, seek)
@@ -165,10 +175,13 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         stats.ended_without_impact = 0 if touched else 1
         impact_due = True
         if touched:
+            since = cycles()
             impact_due = impact(s, ws, cluster) > 0
             impacts += 1
+            ledger.impact_cycles += cycles() - since
     write_bone_states(s, ws.step.end, q, v, cluster.bone_states)
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)
+    ledger.all_cycles += cycles() - start_cycles
 
 
 @entry(ADDRESS[::1], REAL[::1], ADDRESS[:, ::1])

@@ -45,6 +45,21 @@ start is known; time advanced along it, s; its length, s; the length of the next
 the time of its first contact, or infinity; its estimated error, m or rad; the error by rounding, m
 or rad, that was found of late for each second of a step, 0: none."""
 
+LEDGER = np.dtype([
+    *((name, np.int64) for name in (
+        'trials', 'too_much_energy', 'too_deep', 'closed_unseen', 'new_contacts', 'past_impact',
+        'solves', 'contacts', 'rows', 'dofs', 'newton_steps', 'gap_updates', 'narrow_phases')),
+    *((name, np.int64) for name in (
+        'gaps_cycles', 'flight_cycles', 'begin_cycles', 'dynamics_cycles', 'find_cycles',
+        'solve_cycles', 'finish_cycles', 'impact_cycles', 'all_cycles'))], align=True)
+"""What a cluster's steps are made of, since the start. Trials of contact steps, and those that were
+rejected: for the energy that they added, for penetration, for what closed faster than is allowed
+where impacts are not sought, for contacts that they had not known, to end at an impact. Islands
+that were solved, with their contacts, rows, and degrees of freedom of their dolls; Newton steps.
+Times that all gaps were found, and pairs of which that took a narrow phase. Cycles of the processor
+in: finding gaps outside of steps, flight, the beginning of steps, motion without contacts, finding
+contacts, their solve, the end of steps with its gaps, impacts, and all."""
+
 STEP_STATS = np.dtype([
     ('flight_steps', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
     ('unsolved', np.int64), ('contacts_dropped', np.int64), ('toi_failures', np.int64),
@@ -52,7 +67,7 @@ STEP_STATS = np.dtype([
     ('ended_without_impact', np.int64), ('last_dt', float), ('next_dt', float),
     ('work_pushes', float), ('work_grabs', float), ('work_position_correction', float),
     ('energy_removed', float), ('energy_unremoved', float), ('gaps_current', np.int64),
-    ('flights_cut', np.int64)], align=True)
+    ('flights_cut', np.int64), ('ledger', LEDGER)], align=True)
 """Since the start: flight steps, contact steps, impacts, Gauss-Seidel sweeps; islands that stayed
 unsolved, contacts dropped for want of space, searches for a time of impact that failed, impacts
 whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last
@@ -60,7 +75,7 @@ step: its contacts, whether it ended without an impact, its length and the longe
 have, s (0: any). Work of pushes, of grabs, and of position correction beyond its share of the
 kinetic energy, J. Spurious energy gained in steps, J: removed from the motion, and left, where
 nothing moved. ``gaps_current``: whether the gaps are those at q. ``flights_cut``: ticks, or parts
-of them, in which flight steps reached their bound."""
+of them, in which flight steps reached their bound. ``ledger``: see above."""
 
 ClusterState = collections.namedtuple(
     'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '

@@ -69,7 +69,7 @@ Island = collections.namedtuple(
     'start_velocity curvature correction soft velocity residual direction best step_start active '
     'places is_normal normal_rhs normal_impulses normal_row z z_direction anderson '
     'bodies body_number elimination dof_place A B BY coupled phi local lu occurrence_start '
-    'occurrences')
+    'occurrences newton_steps')
 """An island of m contacts (``members``) and their rows, and scratch to solve it.
 
 ``label`` (d,): island of each doll. Rows ``Y`` = J L^-1 have entries for the degrees of freedom
@@ -81,7 +81,7 @@ start; ``curvature`` bias; ``correction`` impulses; ``soft`` impulses without re
 others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p; of sparse_newton.py:
 ``bodies`` (n,) that contacts move, ``body_number`` (n,) of each among them, their order of
 ``elimination``, the ``dof_place`` (nv,) that follows, ``lu`` and ``occurrences``; ``anderson``: of
-sweeps."""
+sweeps. ``newton_steps`` (1,): counted by both of Newton's methods."""
 
 Step = collections.namedtuple(
     'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
@@ -162,7 +162,7 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         coupled=np.zeros(max(rows, 8), np.int64),
         phi=np.zeros((contacts, 5)), local=np.zeros(5), lu=make_sparse_lu(nv, contacts, wide),
         occurrence_start=np.zeros(nv + 1, np.int64),
-        occurrences=np.zeros(contacts * wide, OCCURRENCE))
+        occurrences=np.zeros(contacts * wide, OCCURRENCE), newton_steps=np.zeros(1, np.int64))
 
 
 WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

@@ -9,7 +9,7 @@ import numpy as np
 from ....model.coordinates import DofLayout
 from ....model.scene import Scene
 from ...accuracy import Accuracy
-from ...kernels.cluster_state import STEP_STATS, ClusterState, make_cluster_state
+from ...kernels.cluster_state import LEDGER, STEP_STATS, ClusterState, make_cluster_state
 from ...kernels.compiling.bundle import bind
 from ...kernels.contact_kind import LIMIT
 from ...kernels.loaded import advance as kernels
@@ -224,6 +224,12 @@ class Clusters:
     def totals(self) -> dict[str, float]:
         """Statistics since the start, summed over clusters."""
         return {name: self.stats[name].sum() for name in SUMMED_STATS}
+
+    def ledger(self) -> dict[str, int]:
+        """What all steps since the start are made of; see LEDGER."""
+        counted = ('steps', 'impacts', 'flight_steps', 'sweeps')
+        return {**{name: int(self.stats[name].sum()) for name in counted},
+                **{name: int(self.stats['ledger'][name].sum()) for name in LEDGER.names}}
 
     def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Contacts (c,) of each cluster's last step; clusters in flight have none. With the bones

@@ -190,6 +190,9 @@ class RigidEngine:
             'flights_cut_total': int(stats['flights_cut']),
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 
+    def ledger(self) -> dict[str, int]:
+        return self._clusters.ledger()
+
     def save(self) -> object:
         return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energies
 

@@ -157,6 +157,9 @@ class SubsteppedEngine(ABC):
         """Measures of the energy account, and the substeps of the last advance()."""
         return {**self._account.measures(self.doll_totals.energy), 'substeps': self._taken}
 
+    def ledger(self) -> dict[str, int]:
+        return {}
+
     def save(self) -> object:
         return self._save(), self._account.copy()
 

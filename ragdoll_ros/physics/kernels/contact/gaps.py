@@ -67,7 +67,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
     still (h infinite: unknown); may be ``out``. Reads ws.excluded and contacts.motion[].correction.
     """
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
-    n = 0
+    n, narrow_phases = 0, 0
     for k in range(len(s.geoms)):
         if s.ground_offset[0] > -math.inf:
             ground_gaps(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k],
@@ -89,7 +89,13 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
         least = before[n + k] - 2 * (
             motion_bound(motion[a.body], a.reach, h) + motion_bound(motion[b.body], b.reach, h))
-        out[n + k] = least if least > NEAR else pair_gap(s, k, kin)
+        if least > NEAR:
+            out[n + k] = least
+        else:
+            out[n + k] = pair_gap(s, k, kin)
+            narrow_phases += 1
+    ws.stats[0].ledger.gap_updates += 1
+    ws.stats[0].ledger.narrow_phases += narrow_phases
 
 
 @compiled

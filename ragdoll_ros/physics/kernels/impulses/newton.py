@@ -195,6 +195,7 @@ def newton(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, toleran
                 keep[i] = p[i]
         if best <= tolerance or late > PATIENCE or turn == MAX_STEPS:
             break
+        island.newton_steps[0] += 1
         linearize(island, m, n, p, proximal)
         if not solve_reduced(island.G, n, direction, island.places, island.active):
             break

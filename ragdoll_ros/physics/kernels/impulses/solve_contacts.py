@@ -84,6 +84,7 @@ def solve_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: 
             contact_jacobian(s, kin, q, island, contacts[i], i, v, v_free)
             apply_inverse_factor(s.dof_parent, L, island, i, contacts[i])
         solve_island(s, ws, count, rows, h, tolerance)
+        count_solve(s, ws, number, count, rows)
     solve_lower(L, s.dof_parent, change)
     if h > 0:
         solve_lower(L, s.dof_parent, correction)
@@ -111,6 +112,20 @@ def collect_island(ws: Workspace, begin: int, m: int, number: int) -> tuple[int,
         rows += c.kind
         count += 1
     return count, rows
+
+
+@compiled
+def count_solve(s: System, ws: Workspace, number: int, count: int, rows: int) -> None:
+    """Enter the solve of island ``number``, of so many contacts and rows, in the ledger."""
+    ledger, island = ws.stats[0].ledger, ws.island
+    ledger.solves += 1
+    ledger.contacts += count
+    ledger.rows += rows
+    for j in range(len(s.dof_body)):
+        if island.label[s.body_doll[s.dof_body[j]]] == number:
+            ledger.dofs += 1
+    ledger.newton_steps += island.newton_steps[0]
+    island.newton_steps[0] = 0
 
 
 @compiled

@@ -350,6 +350,7 @@ def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, t
                 keep[i] = p[i]
         if best <= tolerance or late > SPARSE_PATIENCE or turn == SPARSE_STEPS:
             break
+        island.newton_steps[0] += 1
         for k in range(m):
             eliminate_contact(island, k, proximal)
             multiply_rows(island, k)

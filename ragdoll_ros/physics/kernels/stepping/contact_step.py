@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..cluster_state import ClusterState
+from ..compiling.cycles import cycles
 from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts, had_met
 from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
@@ -87,11 +88,16 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
     spring.target.
     """
     q, v, step, kin = cluster.q, cluster.v, ws.step, ws.step.middle
+    ledger, start_cycles = ws.stats[0].ledger, cycles()
     integrate_positions(s.tree, q, v, h / 2, step.q_middle)
     forward_kinematics(s.tree, step.q_middle, v, kin)
     unconstrained_velocity(s, ws, cluster, h, since + h / 2)
+    moved = cycles()
+    ledger.dynamics_cycles += moved - start_cycles
     place_geoms(s.tree, s.body_root, s.geoms, step.q_middle, kin)
     m = find_contacts(s, ws, kin, step.q_middle, ws.contacts.gaps_active, SLOW * h)
+    found = cycles()
+    ledger.find_cycles += found - moved
     step.scalars[0].residual = 0.0
     if m:
         warm_start(s, ws, m, cluster.contacts, h)
@@ -111,6 +117,7 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
     else:
         for j in range(len(v)):
             step.v_end[j], step.correction[j] = step.v_free[j], 0.0
+    ledger.solve_cycles += cycles() - found
     persist = m > 0 and all_persist(ws, m, h)
     for j in range(len(v)):
         cluster.contact_accelerations[j] = step.v_change[j] / h if persist else 0.0

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..cluster_state import ClusterState
+from ..compiling.cycles import cycles
 from ..compiling.decorators import compiled
 from ..contact.gaps import (BEYOND_LIMIT, TOUCHING, is_joint_limit_gap,
                             update_kinematics_and_gaps)
@@ -64,7 +65,7 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
 
     ``nominal``: s of a step where nothing shortens it; ``since``: see contact_step().
     """
-    step, stats = ws.step, ws.stats[0]
+    step, stats, ledger = ws.step, ws.stats[0], ws.stats[0].ledger
     length, hit, m = min(h, stats.next_dt) if stats.next_dt > 0 else h, False, 0
     stats.next_dt = 2 * length if 2 * length < nominal else 0.0
     if seek:
@@ -77,8 +78,11 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
     for turn in range(MAX_TRIES):
         stats.work_pushes, stats.work_grabs, stats.work_position_correction = (
             pushes, grabs, corrections)
+        ledger.trials += 1
         m = contact_step(s, ws, cluster, length, since)
+        start_cycles = cycles()
         finish_step(s, ws, cluster, length, since, m)
+        ledger.finish_cycles += cycles() - start_cycles
         now, speed = total_energy(step.sums_after)
         work = stats.work_pushes - pushes + stats.work_grabs - grabs
         gained = now - held - work
@@ -87,6 +91,10 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         if turn < MAX_TRIES - 1 and length > FINEST * nominal and (
                 not gained - step.scalars[0].correction_energy <= tolerated
                 or penetrates_further(s, ws)):
+            if gained - step.scalars[0].correction_energy <= tolerated:
+                ledger.too_deep += 1
+            else:
+                ledger.too_much_energy += 1
             length, hit = begin_trials(s, ws, cluster, length / 2, nominal), False
             stats.next_dt = length
             clear_contact_accelerations(cluster)
@@ -95,17 +103,20 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         if not seek and turn < MAX_TRIES - 1 and length > COARSEST * nominal:
             shorter = unseen_share(s, ws, UNSEEN_SPEED * nominal)
         if shorter < 1:
+            ledger.closed_unseen += 1
             length = max(shorter * length, COARSEST * nominal)
             length = begin_trials(s, ws, cluster, length, nominal)
             stats.next_dt = length
             clear_contact_accelerations(cluster)
             continue
         if not seek and turn < MAX_TRIES - 1 and activate_contacts(s, ws, length):
+            ledger.new_contacts += 1
             continue
         overshot, landed, fast = impacts_at_end(s, ws, length)
         hit = seek and fast
         if seek and turn < MAX_TRIES - 1 and update_bracket(s, ws, length, overshot, landed):
             length = next_trial_step(s, ws, cluster.v)
+            ledger.past_impact += 1
             continue
         gained -= stats.work_position_correction - corrections
         if not gained <= tolerated:

@@ -1,0 +1,21 @@
+"""How many cycles, as cycles() counts them, a second has."""
+import time
+
+from .cycles import COUNTED, cycles
+from .decorators import entry
+
+
+@entry()
+def cycles_now() -> int:
+    """The counter, for Python."""
+    return cycles()
+
+
+def cycle_rate(seconds: float = 0.05) -> float:
+    """Cycles a second, measured over so many; 0 where they are not counted."""
+    if not COUNTED:
+        return 0.0
+    start, first = time.perf_counter(), cycles_now()
+    while time.perf_counter() < start + seconds:
+        pass
+    return (cycles_now() - first) / (time.perf_counter() - start)
