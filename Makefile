@@ -66,6 +66,7 @@ soak: $(COMPILED) ## 864 000 ticks with pushes, resets, changes of scene: nothin
 bench: $(COMPLETE) $(COMPILED) ## cost of ticks and their parts, crowds, swings, people and the page; 30 min
 	@$(BIN)/python -m ragdoll_ros.ros.tools.bench
 	@$(BIN)/python -m ragdoll_ros.ros.tools.crowd_bench
+	@$(BIN)/python -m ragdoll_ros.accuracy.ledger
 	@$(BIN)/python -m ragdoll_ros.accuracy.crowds
 	@$(BIN)/python -m ragdoll_ros.physics.swing.bench
 	@$(BIN)/python test/fit_cost.py

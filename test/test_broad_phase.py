@@ -8,7 +8,8 @@ import pytest
 from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation
 from ragdoll_ros.model.scene import Material
 from ragdoll_ros.model.shapes import Sphere
-from ragdoll_ros.physics.engine.rigid.broad_phase import IMPACT_SPEEDUP, MARGIN, BroadPhase
+from ragdoll_ros.physics.engine.rigid.broad_phase import BroadPhase
+from ragdoll_ros.physics.kernels.collision.sweep_and_prune import IMPACT_SPEEDUP, MARGIN
 
 RADIUS, AHEAD = 0.1, 0.02
 BALL = Ragdoll('ball', (Bone('ball', Sphere(RADIUS), 2.0, (0, 0, 0)),))

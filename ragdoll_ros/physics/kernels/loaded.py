@@ -3,5 +3,6 @@ from .compiling.cache import alone
 
 with alone():
     from . import advance
+    from .collision import sweep_and_prune
 
-__all__ = ['advance']
+__all__ = ['advance', 'sweep_and_prune']

@@ -120,7 +120,7 @@ class Clusters:
 
     def covers(self, pairs: np.ndarray) -> bool:
         """Whether all these pairs (k, 2) of dolls are pairs of the clusters."""
-        return not len(pairs) or bool(np.isin(self._pair_keys(pairs), self._keys_of_pairs).all())
+        return self._keys_of_pairs.issuperset(self._pair_keys(pairs).tolist())
 
     def form(self, pairs: np.ndarray) -> None:
         """Form clusters of dolls that ``pairs`` (k, 2) connect; every other doll stays alone."""
@@ -321,7 +321,7 @@ class Clusters:
         self._firsts = np.array([cluster.dolls[0] for cluster in clusters])
         self.pairs = np.concatenate([NO_PAIRS, *(cluster.pairs for cluster in self._multi_doll)])
         """(k, 2) of dolls that may touch, of all clusters."""
-        self._keys_of_pairs = self._pair_keys(self.pairs)
+        self._keys_of_pairs = frozenset(self._pair_keys(self.pairs).tolist())
         self._jobs = np.array([[cluster.job(worker) for cluster in clusters]
                                for worker in range(self._workers)], np.int64)
         """(workers, k, 3)"""
