@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .model.skeleton import Riders as Riders
     from .model.state import State as State
     from .people.person import person as person
+    from .physics.run_many import run_many as run_many
     from .physics.simulation import Simulation as Simulation
     from .recordings.recording import Recorder as Recorder
     from .recordings.save import save_recording as save_recording
@@ -42,7 +43,8 @@ _MODULES = {
     'RagdollError': 'model.errors', 'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'load_doll': 'files.doll', 'load_scene': 'files.scene',
-    'person': 'people.person', 'save_doll': 'files.doll', 'save_scene': 'files.scene',
+    'person': 'people.person', 'run_many': 'physics.run_many', 'save_doll': 'files.doll',
+    'save_scene': 'files.scene',
     'save_recording': 'recordings.save'}
 """The module that defines each public name; the static imports above are for type checkers."""
 __all__ = list(_MODULES)

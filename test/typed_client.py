@@ -32,6 +32,7 @@ from ragdoll_ros import (
     load_doll,
     load_scene,
     person,
+    run_many,
     save_doll,
     save_recording,
     save_scene,
@@ -45,6 +46,11 @@ def pendulum() -> Ragdoll:
              Bone('weight', weight, mass=2.0, position=(0.0, 0.0, -0.6)))
     hinge = Joint('beam', 'weight', 'hinge', (0.0, 0.0, -0.3), ((0.0, 1.0, 0.0),), ((-1.0, 1.0),))
     return Ragdoll('pendulum', bones, (hinge,))
+
+
+def ends(scenes: list[Scene]) -> list[np.ndarray]:
+    """Last states of several scenes after three ticks."""
+    return [rows[-1] for rows in run_many(scenes, 3, accuracy='draft', threads=2)]
 
 
 def fall(scene: Scene, folder: Path) -> State:
@@ -83,6 +89,7 @@ def main(folder: Path) -> None:
     state = fall(load_scene(str(folder / 'pair.yaml')), folder)
     rows: tuple[int, ...] = state.positions.shape
     assert rows == (len(scene.bone_names), 3) and state.linear_velocities.shape == rows
+    assert ends([scene, scene])[1].shape == (rows[0], 13)
     try:
         Push('torso', duration=-1.0)
     except RagdollError as error:

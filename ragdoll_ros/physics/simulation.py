@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .swing.swings import SwingSimulation
 
 MAX_SAMPLES_PER_TICK = 200  # those of a sensor of 1 kHz in the longest tick
+MAX_TICKS = 10 ** 9  # of one run
 MAX_WORKERS = 64  # threads, each with its own workspace
 
 
@@ -334,6 +335,25 @@ class Simulation:
         if self._swings:
             self._swings.advance(self.time, self.state)
         return self.state
+
+    def run(self, ticks: int) -> np.ndarray:
+        """Advance by so many ticks; returns the rows (ticks, n, 13) of the states at their ends.
+
+        Args:
+            ticks: 0 or more.
+
+        Raises:
+            OutOfRange: ``ticks`` is negative.
+
+        Example:
+            >>> simulation.run(100)[-1, :, :3].shape  # positions after 1 s
+            (10, 3)
+        """
+        errors.check_range('ticks', ticks, 0, MAX_TICKS)
+        rows = np.empty((int(ticks), *self.state.rows.shape))
+        for row in rows:
+            row[:] = self.advance().rows
+        return rows
 
     def place(self, coordinates: GeneralizedState) -> State:
         """Set pose and velocities of all dolls, for now and for later resets, and reset().
