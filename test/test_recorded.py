@@ -24,8 +24,8 @@ from ragdoll_ros.physics.logged_simulation import (
 )
 from ragdoll_ros.physics.simulation import Simulation
 
-QUIET = {'checkpoint', 'advance', 'measures', 'close', 'swings', 'contacts', 'coordinates',
-         'starts', 'parts', 'trail'}
+QUIET = {'checkpoint', 'advance', 'run', 'measures', 'ledger', 'close', 'swings', 'contacts',
+         'coordinates', 'starts', 'parts', 'trail'}
 """Public names of Simulation that change nothing, or only by the ticks that are counted, and its
 deprecated names, which lead to new ones."""
 

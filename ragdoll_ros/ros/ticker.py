@@ -61,7 +61,7 @@ class Ticker:
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
         self._pacer, self._running = Pacer(1.0, 0), False
-        self._ticks_per_wake = 1
+        self._ticks_per_wake, self._caught_up = 1, False
         self._throttles = {interval: PollThrottle(interval)
                            for interval in (SERVICE_INTERVAL, QOS_EVENT_INTERVAL)}
         self._timer = node.create_timer(1.0, self._on_timer, clock=steady)
@@ -112,12 +112,17 @@ class Ticker:
         for throttle in self._throttles.values():
             throttle.wake(woken)
         end, dropped = woken + MAX_CALLBACK_TIME, self._pacer.dropped_time
-        for index in range(self._max_ticks):
+        made = 0
+        while made < self._max_ticks:
             now = time.monotonic_ns()
-            # A second one before it is due would have a stamp in the future.
-            if now > end or not self._pacer.due(now, early=index == 0):
+            # A second one before it is due would have a stamp in the future, as would one of a late
+            # wake-up whose own tick the last wake-up has made.
+            early = made == 0 and not self._caught_up
+            if now > end or not self._pacer.due(now, early):
                 break
             self._tick(self._pacer.last_due)
+            made += 1
+        self._caught_up = made > self._ticks_per_wake
         if self._pacer.dropped_time != dropped:
             # Ticks are due in another phase now. The timer would come up to half a period before
             # them, and stamps would lie in the future.

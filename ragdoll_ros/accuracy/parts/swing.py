@@ -3,10 +3,13 @@
 For comparison VRM spring bones (VRMC_springBone-1.0: a Verlet step with drag, stiffness and gravity
 each times the frame's length), whose period depends on the frame rate.
 """
+from __future__ import annotations
+
 import functools
 import math
 from collections.abc import Callable
 from time import process_time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +19,11 @@ from ...model.shapes import Sphere
 from ...model.state import State
 from ...model.swing import Link, Swing
 from ...physics.swing.mount import SwingMount
-from ...physics.swing.swings import Swings
 from ..references.closed_forms import pendulum_angle
 from ..results.runner import Job, Row, RunOptions
+
+if TYPE_CHECKING:
+    from ...physics.swing.swings import Swings
 
 NAME = 'swing'
 RATES = (15, 30, 60, 120, 240)
@@ -50,6 +55,8 @@ def measure() -> list[Row]:
 
 
 def _swings(link: Link, mode: str, gravity: float, **fields: object) -> Swings:
+    # Imported here, because it compiles.
+    from ...physics.swing.swings import Swings
     swing = Swing('swing', 'bone', (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (link,), mode=mode, **fields)
     mount = SwingMount.on(swing, Bone('bone', Sphere(0.1), 1.0, (0.0, 0.0, 0.0)), 0)
     return Swings([mount], (0.0, 0.0, -gravity), lambda time: STILL)

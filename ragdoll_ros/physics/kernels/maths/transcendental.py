@@ -6,6 +6,7 @@ where it uses fused multiply-add. These are the same bits everywhere.
 from __future__ import annotations
 
 import math
+from decimal import Decimal, localcontext
 
 import numpy as np
 
@@ -20,13 +21,30 @@ C4, C6, C8, C10, C12, C14, C16, C18 = ((-1) ** k / math.factorial(2 * k) for k i
 """Taylor coefficients: within pi / 4 the next ones are below rounding."""
 
 
-_MIDDLES = (np.arange(1, 32) + 0.5) / 16
-NODE = np.array([0.0, *np.arctan2(1 - abs(1 - _MIDDLES), 1 - _MIDDLES), math.pi])
-NODE_SIN, NODE_COS = np.sin(NODE), np.cos(NODE)
-"""Angles, rad: 0, and of the middles of 31 equal pieces of the way from (1, 0) by (0, 1) to
-(-1, 0)."""
+def _node(place: float) -> tuple[float, float, float]:
+    """Angle, sine and cosine of the direction (1 - place, 1 - |1 - place|), rounded correctly, so
+    the same on all machines.
+    """
+    with localcontext() as context:
+        context.prec = 40
+        x, y = 1 - Decimal(place), 1 - abs(1 - Decimal(place))
+        size = (x * x + y * y).sqrt()
+        sin, cos = y / size, x / size
+        tangent, share = y / (size + x), 2
+        for _ in range(4):
+            tangent, share = tangent / (1 + (1 + tangent * tangent).sqrt()), 2 * share
+        angle, power = Decimal(0), share * tangent
+        for k in range(1, 41, 2):
+            angle, power = angle + power / k, -power * tangent * tangent
+    return float(angle), float(sin), float(cos)
 
-LN2 = math.log(2)
+
+NODE, NODE_SIN, NODE_COS = np.array([
+    (0.0, 0.0, 1.0), *(_node((k + 0.5) / 16) for k in range(1, 32)), (math.pi, 0.0, -1.0)]).T.copy()
+"""Angles, rad, with sine and cosine: 0, and of the middles of 31 equal pieces of the way from
+(1, 0) by (0, 1) to (-1, 0)."""
+
+LN2 = 0.6931471805599453
 LN2_HIGH, LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
 """ln 2, and in two parts; a whole number of up to 2**20 times the first one is not rounded."""
 

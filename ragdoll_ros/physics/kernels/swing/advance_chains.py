@@ -62,29 +62,29 @@ def substep_count(forces: tuple[Vec3, Vec3], r: np.ndarray) -> int:
 
 
 @inlined
-def step_chain(chains: Chains, responses: np.ndarray, states: np.ndarray, start: int, stop: int,
-               frame: Frame, forces: tuple[Vec3, Vec3]) -> None:
+def step_chain(links: np.ndarray, responses: np.ndarray, states: np.ndarray, start: int, stop: int,
+               frame: Frame, forces: tuple[Vec3, Vec3], most: float) -> None:
     """Integrate the links from ``start`` to ``stop`` over one step; ``frame``: at the first root at
     its end; ``forces``: on the first link.
 
-    What hangs on other links turns by at most half a turn in an interval of the grid, the frame at
-    its root too: the next link resolves no more, and an undamped chain would gain energy from
-    aliasing, without end.
+    What hangs on other links turns by at most ``most`` rad/s, half a turn in an interval of the
+    grid, the frame at its root too: the next link resolves no more, and an undamped chain would
+    gain energy from aliasing, without end.
     """
-    most = math.pi / chains.responses[0].h
-    step_link(chains.links[start], responses[start], states[start], frame, forces)
+    step_link(links[start], responses[start], states[start], frame, forces)
     for k in range(start + 1, stop):
-        link, state, r = chains.links[k], states[k], responses[k]
-        frame = tip_frame(chains.links[k - 1], states[k - 1], most)
+        link, state, r = links[k], states[k], responses[k]
+        frame = tip_frame(links[k - 1], states[k - 1], most)
         step_link(link, r, state, frame, root_forces(link, r, state, frame))
         put(state.rate, limited(vec(state.rate), most))
 
 
 @compiled
-def part_step(chains: Chains, states: np.ndarray, start: int, stop: int, frame: Frame) -> None:
-    """Integrate a chain over one step of which ``chains.part_responses`` are."""
-    forces = root_forces(chains.links[start], chains.part_responses[start], states[start], frame)
-    step_chain(chains, chains.part_responses, states, start, stop, frame, forces)
+def part_step(links: np.ndarray, responses: np.ndarray, states: np.ndarray, start: int, stop: int,
+              frame: Frame, most: float) -> None:
+    """Integrate a chain over one of several steps into which one is divided."""
+    forces = root_forces(links[start], responses[start], states[start], frame)
+    step_chain(links, responses, states, start, stop, frame, forces, most)
 
 
 @entry(LINKS, NUMBER, RESPONSES)
@@ -129,25 +129,29 @@ def advance_chains(chains: Chains, states: np.ndarray, knots: np.ndarray, rows: 
     of ``h`` s.
     """
     matrix = np.empty((3, 3))
-    responses = chains.responses
+    # Locals, as each array that is taken from a tuple is counted.
+    links, starts, ends, roots = chains.links, chains.starts, chains.ends, chains.roots
+    responses, part_responses = chains.responses, chains.part_responses
+    most = math.pi / responses[0].h
     if h != responses[0].h:
-        responses = chains.part_responses
+        responses = part_responses
         for k in range(len(states)):
-            set_response(chains.links[k], h, responses[k])
+            set_response(links[k], h, responses[k])
     for index in range(begin, end):
-        set_bones(origin + (index + 1) * h, knots, rows, chains.roots)
-        for chain in range(len(chains.starts)):
-            start, stop = chains.starts[chain], chains.ends[chain]
-            link = chains.links[start]
-            frame = root_frame(link, chains.roots[link.bone], matrix)
+        set_bones(origin + (index + 1) * h, knots, rows, roots)
+        for chain in range(len(starts)):
+            start, stop = starts[chain], ends[chain]
+            link = links[start]
+            frame = root_frame(link, roots[link.bone], matrix)
             forces = root_forces(link, responses[start], states[start], frame)
             substeps = substep_count(forces, responses[start])
             if substeps == 1:
-                step_chain(chains, responses, states, start, stop, frame, forces)
+                step_chain(links, responses, states, start, stop, frame, forces, most)
                 continue
             for k in range(start, stop):
-                set_response(chains.links[k], h / substeps, chains.part_responses[k])
+                set_response(links[k], h / substeps, part_responses[k])
             for part in range(1, substeps):
                 bone = bone_at(origin + (index + part / substeps) * h, knots, rows, link.bone)
-                part_step(chains, states, start, stop, root_frame(link, bone, matrix))
-            part_step(chains, states, start, stop, frame)
+                part_step(links, part_responses, states, start, stop,
+                          root_frame(link, bone, matrix), most)
+            part_step(links, part_responses, states, start, stop, frame, most)
