@@ -28,21 +28,28 @@ SIZE = 240, 150
 """Pixels of a picture."""
 
 SCENES = {'drop': (0.42, 0.7, 1), 'man_faints': (0.75, 0.7, 1), 'woman_faints': (0.75, 0.7, 1),
-          'character_falls': (0.45, 0.8, 1), 'ponytail': (0.5, 0.6, 1), 'article': (0.6, 0.6, 1),
+          'character_falls': (0.45, 0.8, 1), 'ponytail': (0.42, 0.6, 1), 'article': (0.6, 0.6, 1),
           'flight': (0.0, 0.7, 1), 'crowd': (0.9, 0.6, 1), 'pile': (0.6, 0.6, 16),
           'field': (0.4, 0.3, 1000)}
 """Instant of the picture, s; distance of the camera, relative to the home view; and how many
 processors can share a tick: its separate clusters."""
 
+TURNS = {'ponytail': 130.0}
+"""Degrees about the vertical by which the camera is turned from the home view, to see the hair."""
+
 DURATION = 3.0
 """s that are measured; a scene is at its busiest within."""
 
 
-def picture(page: Page, distance: float) -> bytes:
-    """WebP of what a page shows from another ``distance``."""
+def picture(page: Page, distance: float, turn: float) -> bytes:
+    """WebP of what a page shows from another ``distance``, from a side ``turn`` degrees away."""
     client = next(iter(page.server.get_clients().values()))
     camera = client.camera
-    camera.position = camera.look_at + distance * (camera.position - camera.look_at)
+    middle = np.array(camera.look_at)
+    x, y, z = distance * (camera.position - middle)
+    cos, sin = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    camera.position = middle + np.array([x * cos - y * sin, x * sin + y * cos, z])
+    camera.look_at = middle
     image = client.get_render(2 * SIZE[1], 2 * SIZE[0], transport_format='png', timeout=100.0)
     rgba = Image.fromarray(image).convert('RGBA')
     white = Image.new('RGBA', rgba.size, 'white')
@@ -67,7 +74,8 @@ def take_pictures(names: list[str]) -> None:
                       and page.frame.time >= end - 1e-9)
             view.key('h')
             view.page.wait_for_timeout(2000)
-            (FOLDER / f'{name}.webp').write_bytes(picture(page, distance))
+            (FOLDER / f'{name}.webp').write_bytes(
+                picture(page, distance, TURNS.get(name, 0.0)))
         view.close()
 
 
