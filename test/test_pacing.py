@@ -32,6 +32,12 @@ def test_periods_that_are_no_whole_number_do_not_drift():
     assert sum(ticks(pacer, range(0, 100_000_000_000, 16_000_000))) == pytest.approx(6000, abs=1)
 
 
+def test_how_early_a_tick_may_be_is_a_share_of_the_period():
+    pacer = Pacer(PERIOD, 0)
+    assert not pacer.due(PERIOD - 1, 0.0) and not pacer.due(9 * PERIOD // 10 - 1, 0.1)
+    assert pacer.due(9 * PERIOD // 10 + 1, 0.1) and pacer.last_due == PERIOD
+
+
 def test_a_short_stall_is_caught_up():
     pacer = Pacer(PERIOD, 0)
     assert ticks(pacer, [PERIOD, 6 * PERIOD, 7 * PERIOD]) == [1, 5, 1]

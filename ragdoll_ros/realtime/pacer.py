@@ -37,12 +37,14 @@ class Pacer:
             self._on_time = now
         return max(0.0, self._next - now)
 
-    def due(self, now: int, early: bool = True) -> bool:
-        """Whether a tick is due; if so, it counts as made. ``early``: also half a period before."""
+    def due(self, now: int, early: float = 0.5) -> bool:
+        """Whether a tick is due; if so, it counts as made. ``early``: the share of the period by
+        which it may be made before.
+        """
         lag = now - self._next
         if lag <= 0:
             self._on_time = now
-        if lag < (-self.period / 2 if early else 0):
+        if lag < -self.period * early:
             return False
         overloaded = now - self._on_time > max(MAX_CATCH_UP, 2 * self.period)
         if overloaded or lag > max(MAX_LAG, self.period):

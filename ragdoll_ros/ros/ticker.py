@@ -16,6 +16,9 @@ MIN_TIMER_PERIOD = 1_000_000
 MAX_CALLBACK_TIME = 20_000_000
 """ns that one timer callback may spend on ticks before other callbacks get their turn."""
 
+TIMER_ROUNDING = 1_000_000
+"""ns by which a timer may come before it should."""
+
 CATCH_UP_RATE = 2
 """Largest tick rate after a stall, over the normal rate: queues are ten messages deep."""
 
@@ -112,13 +115,14 @@ class Ticker:
         for throttle in self._throttles.values():
             throttle.wake(woken)
         end, dropped = woken + MAX_CALLBACK_TIME, self._pacer.dropped_time
-        made = 0
+        made, early = 0, 0.5
+        if self._caught_up:
+            # This wake-up may be a late one, whose tick the last one has made. The next one before
+            # it is due would have a stamp in the future, as would a second one.
+            early = min(early, TIMER_ROUNDING / self._pacer.period)
         while made < self._max_ticks:
             now = time.monotonic_ns()
-            # A second one before it is due would have a stamp in the future, as would one of a late
-            # wake-up whose own tick the last wake-up has made.
-            early = made == 0 and not self._caught_up
-            if now > end or not self._pacer.due(now, early):
+            if now > end or not self._pacer.due(now, 0.0 if made else early):
                 break
             self._tick(self._pacer.last_due)
             made += 1

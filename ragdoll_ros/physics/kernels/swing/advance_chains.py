@@ -2,7 +2,7 @@
 
 The state at a time between two points of the grid is one shorter step from the last of them, which
 is then discarded: a state depends on the start, the time and the bones' motion, not on which other
-knots were asked for.
+times were asked for.
 """
 from __future__ import annotations
 
