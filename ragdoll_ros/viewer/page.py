@@ -37,6 +37,10 @@ PERIOD = 1 / 60
 IDLE_PERIOD = 0.1
 """s between two checks for an open page."""
 
+LOOK_PERIOD = 0.1
+"""s between two looks at what a reader or a camera does not miss within: health, settings, whether
+the doll leaves the view."""
+
 SIMULATION_HINT = ('<span class="ragdoll-mouse">Drag a bone. Arrow keys push, tap or hold; a click '
                    'on a bone chooses which. T throws a ball. Space pauses, R resets, E edits, '
                    'H shows the home view.</span><span class="ragdoll-touch">Drag a bone with one '
@@ -64,6 +68,7 @@ class Page:
         self._live: Frame | None = None
         self._has_contacts = False
         """Whether contacts are drawn."""
+        self._next_look = 0.0
         self._folder = folder
         configure_lights(server)
         configure_theme(server, dark=False)
@@ -161,19 +166,23 @@ class Page:
         """Draw the source's newest frame, or the one that the timeline selects."""
         self.plots.show(self.timeline.shown_instant(now), now)
         frame = self.timeline.frame_to_show(live, now)
+        looks = now >= self._next_look
         has_contacts = self.display.contacts.value
         if frame is not self.frame or has_contacts != self._has_contacts:
             self._has_contacts = has_contacts
             self._draw(frame)
             if self.timeline.is_live:
                 self.cameras.show(frame)
-                self._follow_if_it_leaves(frame)
+                if looks:
+                    self._follow_if_it_leaves(frame)
         bone = self.controls.pushes.bone
         self.transport.update(live, frame, status, now)
         self.cameras.follow(frame, bone, now, self.display.follow.value)
         self.controls.ball.update(live, self.controls.pushes.motion)
         self._hover.show(frame, self.controls.pushes.motion, now)
-        self.settings.show(status, live.scene, now)
+        if looks:
+            self._next_look = now + LOOK_PERIOD
+            self.settings.show(status, live.scene, now)
 
     def _follow_if_it_leaves(self, frame: Frame) -> None:
         pushes = self.controls.pushes

@@ -48,4 +48,5 @@ class Motion:
 def doll_mean(scene: Scene, bone: int, vectors: np.ndarray) -> np.ndarray:
     """Mean of vectors (n, 3) of all bones over the doll that has a bone, weighted by mass."""
     part = scene.bone_slices[scene.doll_of_bone[bone]]
-    return np.average(vectors[part], axis=0, weights=[each.mass for each in scene.bones[part]])
+    masses = np.array([each.mass for each in scene.bones[part]])
+    return masses @ vectors[part] / masses.sum()
