@@ -19,9 +19,9 @@ from ..physics.simulation import Simulation
 
 SCENES = ('drop', 'woman_faints', 'ponytail', 'crowd')
 
-REJECTED = {'past_impact': 'to end at an impact', 'closed_unseen': 'too long for what closes',
-            'new_contacts': 'contacts that it had not known', 'too_deep': 'penetration',
-            'too_much_energy': 'energy'}
+REJECTED = {'past_impact': 'past a time of impact', 'closed_unseen': 'a gap that closed too far',
+            'new_contacts': 'new contacts within the step', 'too_deep': 'penetration',
+            'too_much_energy': 'energy gain'}
 """Counts of rejected trials, and why."""
 
 STAGES = {'flight_cycles': 'flight', 'gaps_cycles': 'gaps before a step',
@@ -89,7 +89,8 @@ def report(ledger: Ledger) -> str:
         f'{counts["rows"] / solves:.1f} rows and {counts["dofs"] / solves:.0f} degrees of freedom: '
         f'{counts["sweeps"] / solves:.2f} sweeps, {counts["newton_steps"] / solves:.2f} Newton '
         'steps each',
-        f'{counts["gap_updates"]:8d} times all gaps, {counts["narrow_phases"]} narrow phases']
+        f'{counts["gap_updates"]:8d} updates of all gaps, {counts["narrow_phases"]} narrow-phase '
+        'calls']
     if ledger.rate:
         whole = ledger.seconds
         lines += [f'{1e6 * whole / ticks:8.1f} us a tick:',

@@ -164,6 +164,6 @@ def find_pairs(dolls: Dolls, states: np.ndarray, moving: np.ndarray, clusters: n
                 break
             if (moving[a] or moving[b]) and may_touch(dolls, states, a, b):
                 if count < len(pairs):
-                    pairs[count, 0], pairs[count, 1] = min(a, b), max(a, b)
+                    pairs[count] = min(a, b), max(a, b)
                 count += 1
     return count

@@ -2,7 +2,7 @@
 
 Without fastmath every sum, product, quotient and root is rounded by itself, in the order written,
 as IEEE 754 prescribes: the same bits on all processors, for some 4 % of the speed. Where numba does
-not work, functions of files that import it nowhere else stay Python: swings do.
+not work the decorators return functions unchanged: swings then run as plain Python.
 """
 from __future__ import annotations
 

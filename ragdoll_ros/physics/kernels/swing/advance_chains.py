@@ -109,17 +109,16 @@ def begin_chains(chains: Chains, states: np.ndarray, bones: np.ndarray, has_dire
     of them; else in their rest directions, and at rest relative to their frames.
     """
     matrix = np.empty((3, 3))
-    for chain in range(len(chains.starts)):
-        for k in range(chains.starts[chain], chains.ends[chain]):
-            link, state = chains.links[k], states[k]
-            if link.parent < 0:
-                frame = root_frame(link, bones[link.bone], matrix)
-            else:
-                frame = tip_frame(chains.links[link.parent], states[link.parent], math.inf)
-            d = vec(state.direction) if has_directions else outward(frame, vec(link.rest))
-            place(link, state, frame, d)
-            if not has_rates:
-                put(state.rate, vec(state.drift))
+    for k in range(len(states)):
+        link, state = chains.links[k], states[k]
+        if link.parent < 0:
+            frame = root_frame(link, bones[link.bone], matrix)
+        else:
+            frame = tip_frame(chains.links[link.parent], states[link.parent], math.inf)
+        d = vec(state.direction) if has_directions else outward(frame, vec(link.rest))
+        place(link, state, frame, d)
+        if not has_rates:
+            put(state.rate, vec(state.drift))
 
 
 @entry(CHAINS, STATES, KNOTS, ROWS, NUMBER, INDEX, INDEX, NUMBER)
