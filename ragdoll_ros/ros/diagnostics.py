@@ -136,6 +136,10 @@ class Diagnostics:
 class DuplicateNodes:
     """Counts other nodes with the name and namespace of ``node``, and warns of new ones: their
     messages mix with this node's, and ROS does not report it.
+
+    A node is known by its service ~/get_parameters. The list of node names would do, but a node
+    that ends may stay in it: rmw_dds_common's GraphCache adds a participant with each message of
+    its entities, also with one that is read after the participant has gone.
     """
 
     def __init__(self, node: Node) -> None:
@@ -145,8 +149,8 @@ class DuplicateNodes:
     def update(self) -> None:
         """Count the nodes in the graph; to be called by a timer."""
         node = self._node
-        own = node.get_name(), node.get_namespace()
-        before, self.count = self.count, max(0, node.get_node_names_and_namespaces().count(own) - 1)
+        own = f'{node.get_fully_qualified_name()}/get_parameters'
+        before, self.count = self.count, max(0, node.count_services(own) - 1)
         if self.count > before:
             node.get_logger().warning(
                 f'{self.count + 1} nodes are called {node.get_fully_qualified_name()}: their '
