@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .model.shapes import Sphere as Sphere
     from .model.skeleton import Riders as Riders
     from .model.state import State as State
+    from .model.static_body import StaticBody as StaticBody
     from .people.person import person as person
     from .physics.run_many import run_many as run_many
     from .physics.simulation import Simulation as Simulation
@@ -42,10 +43,9 @@ _MODULES = {
     'Placement': 'model.scene', 'Push': 'model.push', 'Ragdoll': 'model.ragdoll',
     'RagdollError': 'model.errors', 'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
-    'State': 'model.state', 'load_doll': 'files.doll', 'load_scene': 'files.scene',
-    'person': 'people.person', 'run_many': 'physics.run_many', 'save_doll': 'files.doll',
-    'save_scene': 'files.scene',
-    'save_recording': 'recordings.save'}
+    'State': 'model.state', 'StaticBody': 'model.static_body', 'load_doll': 'files.doll',
+    'load_scene': 'files.scene', 'person': 'people.person', 'run_many': 'physics.run_many',
+    'save_doll': 'files.doll', 'save_recording': 'recordings.save', 'save_scene': 'files.scene'}
 """The module that defines each public name; the static imports above are for type checkers."""
 __all__ = list(_MODULES)
 

@@ -35,6 +35,11 @@ def test_a_grid_is_a_square_unless_columns_say_otherwise(tmp_path):
     assert places(scene(tmp_path, '{count: 9, grid: [1, 1, 1]}'))[-1] == pytest.approx((3, 4, 3))
 
 
+def test_a_shift_makes_a_flight_of_stairs(tmp_path):
+    assert places(scene(tmp_path, '{count: 3, shift: [0.3, 0, -0.2]}')) == pytest.approx(
+        np.array([(1, 2, 3), (1.3, 2, 2.8), (1.6, 2, 2.6)]))
+
+
 def test_a_seed_strews_and_turns_the_same_way_for_ever(tmp_path):
     repeat = '{count: 200, spread: [2, 1, 0], turned: true, seed: %d}'
     first, again, other = (scene(tmp_path, repeat % seed) for seed in (7, 7, 8))

@@ -32,7 +32,8 @@ ONLY = {'pybullet': 'physics/engine/substepped/bullet.py',
         'trimesh': 'fit/robots/mesh_file.py', 'DracoPy': 'fit/reading/draco.py',
         'pyarrow': 'falls/formats/', 'ray': 'falls/cluster.py', 'mcap_ros2': 'falls/formats/',
         'scipy': 'accuracy/', 'dartpy': 'accuracy/peers/dart.py',
-        'pydrake': 'accuracy/peers/drake.py', 'mcap': ('files/bag.py', 'recordings/mcap_file.py')}
+        'pydrake': 'accuracy/peers/drake.py',
+        'mcap': ('files/bags/bag.py', 'recordings/mcap_file.py')}
 """Libraries, and the one place of each. The report's pendulum in three lines of PyBullet alone is
 what a user would write without this package: it shares no code with it."""
 

@@ -1,6 +1,8 @@
 """Markers and interactive markers against the bones."""
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
@@ -12,6 +14,8 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.push import ARROW_LENGTH, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.model.shapes import Box
+from ragdoll_ros.model.static_body import StaticBody
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.ros.messages.interactive_markers import SCALE, InteractiveMarkers
 from ragdoll_ros.ros.messages.markers import SceneMarkers
@@ -43,6 +47,17 @@ def test_markers_fill_the_shape_of_a_bone(lone):
     inner = rotation.rotate(rotation.inverse(turn), directions)
     expected = directions @ centre + lone.scene.bones[0].shape.support(inner)
     np.testing.assert_allclose(reach, expected, atol=1e-12)
+
+
+def test_markers_show_static_bodies_where_they_stand(lone):
+    body = StaticBody('wall', Box((0.1, 2.0, 3.0)), (1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 1.0))
+    walled = dataclasses.replace(lone.scene, bodies=(body,))
+    array = heard(SceneMarkers(walled, 'map').serialize(7, lone.state, ()))
+    marker, = [marker for marker in array.markers if marker.ns == 'bodies/wall']
+    place, turn, size = marker.pose.position, marker.pose.orientation, marker.scale
+    assert (place.x, place.y, place.z) == body.position
+    assert (turn.x, turn.y, turn.z, turn.w) == body.orientation
+    assert (marker.type, size.x, size.y, size.z) == (Marker.CUBE, 0.1, 2.0, 3.0)
 
 
 def test_ghosts_to_drag_fill_the_shape_of_a_bone_too(lone):

@@ -19,7 +19,7 @@ import dataclasses, hashlib, math, sys
 import numba
 from ragdoll_ros import Push, Simulation, load_scene
 from ragdoll_ros.accuracy.crowds.crowd_digests import of_workers
-from ragdoll_ros.files.scene import repeated_placements
+from ragdoll_ros.files.repeat import repeated
 from ragdoll_ros.model.scene import Ground, Placement
 
 def digest(scene, ticks, workers=1):
@@ -33,7 +33,7 @@ def digest(scene, ticks, workers=1):
     return found.hexdigest()
 
 drop, flight = load_scene('drop'), load_scene('flight')
-sunk = dataclasses.replace(drop, ground=Ground((0.3, 0.1, 0.9)), dolls=tuple(repeated_placements(
+sunk = dataclasses.replace(drop, ground=Ground((0.3, 0.1, 0.9)), dolls=tuple(repeated(
     Placement(drop.dolls[0].doll, 'sunk', (0, 0, -0.3), spin=(1, 2, 3)),
     {'count': 8, 'grid': (9, 9, 0.0), 'columns': (4, 2), 'turned': 'yaw', 'seed': 3})))
 print(digest(drop, 300), digest(flight, 300), digest(sunk, 10), digest(sunk, 10, 3),

@@ -29,6 +29,7 @@ from ragdoll_ros import (
     Simulation,
     Sphere,
     State,
+    StaticBody,
     load_doll,
     load_scene,
     person,
@@ -84,7 +85,7 @@ def main(folder: Path) -> None:
     stand = Ragdoll('stand', (Bone('stand', Cylinder(0.2, 0.1), 5.0, (0.0, 0.0, 0.05)),))
     scene = Scene('pair', (Placement(doll, position=(0.0, 0.0, 2.0)), Placement(stand),
                            Placement(person(1.75, 70.0, 'female'), position=(1.0, 0.0, 0.0))),
-                  Ground())
+                  Ground(), bodies=(StaticBody('wall', Box((0.1, 2.0, 2.0)), (2.0, 0.0, 1.0)),))
     save_scene(scene, folder / 'pair.yaml')
     state = fall(load_scene(str(folder / 'pair.yaml')), folder)
     rows: tuple[int, ...] = state.positions.shape

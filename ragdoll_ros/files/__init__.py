@@ -1,1 +1,1 @@
-"""Files of the model: YAML with JSON schemas, URDF, MJCF; messages of bags."""
+"""Files of the model: YAML with JSON schemas, URDF, MJCF; recorded bags."""

@@ -146,17 +146,28 @@ def _part(data: dict) -> Part:
                 **{key: value for key, value in data.items() if key != kind})
 
 
-def _bone(data: dict) -> Bone:
-    fields = dict(data)
-    found: list[ModelError] = []
-    moments = fields.pop('inertia', None)
+def build_shape(data: dict) -> Shape | Compound:
+    """The shape of a bone or body that has ``shape`` or ``shapes``. Raises ModelError."""
     if 'shape' in data:
-        return Bone(shape=_shape(fields.pop('shape')), moments=moments, **fields)
+        return _shape(data['shape'])
+    found: list[ModelError] = []
     parts = build_each(data, 'shapes', _part, found)
     for error in found:
         raise error
-    del fields['shapes']
-    return Bone(shape=Compound(tuple(parts)), moments=moments, **fields)
+    return Compound(tuple(parts))
+
+
+def shape_data(shape: Shape | Compound) -> dict:
+    """A shape as ``shape`` or ``shapes`` of a bone or body."""
+    if isinstance(shape, Compound):
+        return {'shapes': [_part_data(part) for part in shape.parts]}
+    return {'shape': _shape_data(shape)}
+
+
+def _bone(data: dict) -> Bone:
+    fields = {key: value for key, value in data.items() if key not in ('shape', 'shapes')}
+    moments = fields.pop('inertia', None)
+    return Bone(shape=build_shape(data), moments=moments, **fields)
 
 
 def _joint(data: dict) -> Joint:
@@ -187,13 +198,12 @@ def _part_data(part: Part) -> dict:
 
 
 def _bone_data(bone: Bone) -> dict:
-    shape = ({'shapes': [_part_data(part) for part in bone.shape.parts]}
-             if isinstance(bone.shape, Compound) else {'shape': _shape_data(bone.shape)})
     optional = {'inertia': bone.moments,
                 'orientation': None if bone.orientation == IDENTITY else bone.orientation,
                 'friction': bone.friction, 'rolling_friction': bone.rolling_friction,
                 'restitution': bone.restitution, 'color': bone.color}
-    return {'name': bone.name, **shape, 'mass': bone.mass, 'position': list(bone.position),
+    return {'name': bone.name, **shape_data(bone.shape), 'mass': bone.mass,
+            'position': list(bone.position),
             **{key: list(value) if isinstance(value, tuple) else value
                for key, value in optional.items() if value is not None}}
 

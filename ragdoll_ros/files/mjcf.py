@@ -6,7 +6,8 @@ joint. Approximations:
 - a ball joint with limits is three hinges, as in urdf.py;
 - restitution is a spring and a damper in the contact, and needs small steps;
 - friction is finite; MuJoCo takes the larger of a pair, so each bone has the combined coefficient
-  with the ground, and the ground zero.
+  with the ground, and the ground zero. A static body with a material of its own has priority: its
+  coefficients are those with a bone of the scene's material.
 """
 import math
 import xml.etree.ElementTree as ET
@@ -19,6 +20,7 @@ from ..model.pose import Pose
 from ..model.ragdoll import Bone, Joint, joint_axes
 from ..model.scene import Placement, Scene, finite_friction
 from ..model.shapes import Shape
+from ..model.static_body import StaticBody
 
 CONTACT_TIME = 0.02
 """s, time constant of a contact, MuJoCo's default; the engine sets one for its step."""
@@ -37,6 +39,7 @@ def to_mjcf(scene: Scene, excluded: Collection[frozenset[str]] = ()) -> str:
     world = ET.SubElement(root, 'worldbody')
     if scene.ground is not None:
         _add_ground(world, scene)
+    _add_bodies(world, scene)
     for placement in scene.dolls:
         _add_doll(world, scene, placement)
     contact = ET.SubElement(root, 'contact')
@@ -71,6 +74,18 @@ def _add_ground(world: ET.Element, scene: Scene) -> None:
     ET.SubElement(world, 'geom', name='ground', type='plane', size='0 0 1', contype='1',
                   conaffinity='3', solmix='0', pos=_text(normal * scene.ground.offset),
                   quat=_quaternion(turn), **_material(scene, None))
+
+
+def _add_bodies(world: ET.Element, scene: Scene) -> None:
+    for body in scene.bodies:
+        own = (body.friction, body.rolling_friction, body.restitution)
+        is_special = own != (None, None, None)
+        for number, part in enumerate(body.parts, 1):
+            ET.SubElement(world, 'geom', name=f'bodies/{body.name}/{number}', type=part.kind,
+                          size=_text(_size(part.shape)), pos=_text(part.position),
+                          quat=_quaternion(part.orientation), contype='1', conaffinity='3',
+                          priority='1' if is_special else '0',
+                          **_material(scene, body if is_special else None))
 
 
 def _add_doll(world: ET.Element, scene: Scene, placement: Placement) -> None:
@@ -131,8 +146,8 @@ def _size(shape: Shape) -> tuple[float, ...]:
     return tuple(size / (2 if key == 'length' else 1) for key, size in vars(shape).items())
 
 
-def _material(scene: Scene, bone: Bone | None) -> dict[str, str]:
-    """Friction and restitution of a bone, or of the ground."""
+def _material(scene: Scene, bone: Bone | StaticBody | None) -> dict[str, str]:
+    """Friction and restitution of a bone or static body, or of the ground (None)."""
     friction, rolling, restitution = scene.material.on(bone)
     friction = math.sqrt(finite_friction(friction) * finite_friction(scene.material.friction))
     if bone is None:

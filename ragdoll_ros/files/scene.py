@@ -1,22 +1,16 @@
-"""Scenes as YAML files (config/scene.schema.json): reading with all errors at once, writing.
-
-`repeat:` of a doll gives copies on a grid, scattered, or both.
-"""
-import dataclasses
+"""Scenes as YAML files (config/scene.schema.json): reading with all errors at once, writing."""
 import functools
-import math
 import re
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ..model import rotation
 from ..model.errors import ModelError, OutOfRange
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
+from .bodies import body_data, build_bodies
 from .doll import build_doll, doll_data
+from .repeat import repeated
 from .schema import (
     has_error_under,
     is_marked,
@@ -102,11 +96,12 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
         if doll is not None and not has_error_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
             first = try_build(found, where, Placement, doll, **{key: entry[key] for key in fields})
-            placements += repeated_placements(first, entry['repeat']) if (
+            placements += repeated(first, entry['repeat']) if (
                 first and 'repeat' in entry) else [first]
-    if len(placements) > MOST_DOLLS:
-        found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
-    parts = {}
+        if len(placements) > MOST_DOLLS:
+            found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
+            break
+    parts: dict[str, Any] = {'bodies': build_bodies(data, found)}
     for key, part in (('ground', Ground), ('material', Material)):
         if isinstance(data.get(key), dict) and not has_error_under(found, key):
             parts[key] = try_build(found, key, part, **data[key])
@@ -140,6 +135,8 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
         for key in ('position', 'orientation', 'velocity', 'spin'):
             entry[key] = list(getattr(placement, key))
         data['dolls'].append(entry)
+    if scene.bodies:
+        data['bodies'] = [body_data(body) for body in scene.bodies]
     return data
 
 
@@ -170,41 +167,3 @@ def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None
     return dressed, [type(error)(
         shift.sub(lambda match: f'swings[{int(match[1]) - own}]', error.path),
         error.value, error.expected) for error in found]
-
-
-def repeated_placements(first: Placement, repeat: dict) -> list[Placement]:
-    """Copies of a placement, named ``name_1`` on; ``repeat`` as in scene.schema.json.
-
-    The grid starts at the first's position and fills x, then y, then z; each copy is then moved by
-    up to half of ``spread`` along each axis. The same seed gives the same copies. ``turned: yaw``
-    rotates by up to 180 degrees about the vertical through the centre of mass, any other by a
-    random rotation about the origin of the doll's frame.
-    """
-    count, rng = int(repeat['count']), np.random.default_rng(int(repeat.get('seed', 0)))
-    columns = repeat.get('columns') or [math.ceil(math.sqrt(count))] * 2
-    wide, deep = (int(number) for number in columns)
-    grid = np.array(repeat.get('grid', (0.0, 0.0, 0.0)), float)
-    spread = np.array(repeat.get('spread', (0.0, 0.0, 0.0)), float)
-    copies = []
-    for k in range(count):
-        cell = np.array([k % wide, k // wide % deep, k // (wide * deep)])
-        place = np.array(first.position) + cell * grid + spread * rng.uniform(-0.5, 0.5, 3)
-        turn: Any = first.orientation
-        if repeat.get('turned') == 'yaw':
-            place, turn = _yawed(first, place, rng.uniform(0, math.pi))
-        elif repeat.get('turned'):
-            turn = tuple(rotation.normalized(rng.normal(size=4)))
-        copies.append(dataclasses.replace(first, name=f'{first.name}_{k + 1}',
-                                          position=tuple(place.tolist()), orientation=turn))
-    return copies
-
-
-def _yawed(first: Placement, place: np.ndarray,
-           angle: float) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Position (3,) m and orientation of a copy, rotated by ``angle`` rad about the vertical
-    through its centre of mass; before, its frame is at ``place``.
-    """
-    turn = rotation.from_axis_angle((0.0, 0.0, 1.0), angle)
-    arm = rotation.rotate(first.orientation, first.doll.mass_centre)
-    orientation = rotation.normalized(rotation.multiply(turn, np.array(first.orientation)))
-    return place + arm - rotation.rotate(turn, arm), tuple(orientation.tolist())

@@ -88,8 +88,15 @@ def _expected(error: jsonschema.ValidationError) -> str:
 
 @functools.cache
 def _validator(name: str) -> jsonschema.Draft7Validator:
-    path = config.config_folder() / f'{name}.schema.json'
-    return jsonschema.Draft7Validator(json.loads(path.read_text(encoding='utf-8')))
+    schema, doll = _read(name), _read('doll')
+    schema['definitions'] = doll['definitions'] | schema['definitions']
+    return jsonschema.Draft7Validator(schema)
+
+
+def _read(name: str) -> dict:
+    """A schema in config/; references to the doll's are made its own."""
+    text = (config.config_folder() / f'{name}.schema.json').read_text(encoding='utf-8')
+    return json.loads(text.replace('"doll.schema.json#', '"#'))
 
 
 def read_by_name(name: str) -> tuple[object, Path]:

@@ -1,4 +1,4 @@
-"""A scene: dolls and their initial states, ground, material, gravity, tick. Frozen, validated data.
+"""A scene: dolls and their initial states, what is around them, gravity, tick. Frozen and checked.
 
 SI units, world frame: x forward, y left, z up (REP 103). Quaternions are x, y, z, w.
 files/scene.py reads and writes it.
@@ -16,6 +16,7 @@ from .errors import set_fields
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
 from .rotation import IDENTITY
+from .static_body import StaticBody
 from .vectors import Quaternion, Vector, finite_floats, unit_vector
 
 SECOND = 1_000_000_000
@@ -39,7 +40,7 @@ LARGEST_FRICTION = 10.0
 
 @dataclass(frozen=True)
 class Material:
-    """Contact parameters of all bones that have none of their own, and of the ground.
+    """Contact parameters of all bones and bodies that have none of their own, and of the ground.
 
     ``friction`` is Coulomb's coefficient (infinity: no slip; NO_SLIP in PyBullet and MuJoCo),
     ``rolling_friction`` a lever arm in m, ``restitution`` the speed of separation over the speed
@@ -57,8 +58,10 @@ class Material:
         errors.check_range('restitution', self.restitution, 0, 1)
         errors.check_range('restitution_speed', self.restitution_speed, 0, 1e6)
 
-    def on(self, bone: Bone | None) -> tuple[float, float, float]:
-        """Friction, rolling friction (m) and restitution of a bone, or of the ground (None)."""
+    def on(self, bone: Bone | StaticBody | None) -> tuple[float, float, float]:
+        """Friction, rolling friction (m) and restitution of a bone or body, or of the ground
+        (None).
+        """
         return tuple(getattr(self, key) if getattr(bone, key, None) is None else getattr(bone, key)
                      for key in ('friction', 'rolling_friction', 'restitution'))
 
@@ -141,6 +144,7 @@ class Scene:
         pace: real-time factor that the node starts with.
         self_collision: whether the bones of a doll collide with each other.
         description: a sentence on it.
+        bodies: StaticBody objects; their names differ from each other and from the dolls'.
 
     Raises:
         WrongForm, OutOfRange, NotPositive, NotFinite, DuplicateName: for its fields.
@@ -159,19 +163,23 @@ class Scene:
     pace: float = 1.0
     self_collision: bool = True
     description: str = ''
+    bodies: tuple[StaticBody, ...] = ()
 
     def __post_init__(self) -> None:
-        set_fields(self, dolls=tuple(self.dolls), gravity=finite_floats('gravity', self.gravity))
+        set_fields(self, dolls=tuple(self.dolls), bodies=tuple(self.bodies),
+                   gravity=finite_floats('gravity', self.gravity))
         if not self.dolls:
             raise errors.WrongForm('dolls', (), 'at least one doll')
         for value in self.gravity:
             errors.check_range('gravity', value, -MAX_GRAVITY, MAX_GRAVITY)
         errors.check_range('step', self.step, *STEP_RANGE)
         errors.check_positive('pace', self.pace)
-        names = [placement.name for placement in self.dolls]
-        for index, name in enumerate(names):
-            if name in names[:index]:
-                raise errors.DuplicateName(f'dolls[{index}].name', name, 'a unique name')
+        names: set[str] = set()
+        for key in ('dolls', 'bodies'):
+            for index, one in enumerate(getattr(self, key)):
+                if one.name in names:
+                    raise errors.DuplicateName(f'{key}[{index}].name', one.name, 'a unique name')
+                names.add(one.name)
 
     @cached_property
     def bones(self) -> tuple[Bone, ...]:
@@ -206,7 +214,8 @@ class Scene:
         ground = 'over the ground' if self.ground else 'without ground'
         dolls = ', '.join(f'{placement.name!r} of {len(placement.doll.bones)} bones'
                           for placement in self.dolls[:3]) + ', ...' * (len(self.dolls) > 3)
-        return f'Scene {self.name!r}: {dolls}; {ground}, tick {self.step:g} s'
+        bodies = f', {len(self.bodies)} static bodies' if self.bodies else ''
+        return f'Scene {self.name!r}: {dolls}; {ground}{bodies}, tick {self.step:g} s'
 
     def qualified(self, placement: Placement, name: str) -> str:
         """Name of a doll's bone or angle in the scene: prefixed where there are several dolls."""

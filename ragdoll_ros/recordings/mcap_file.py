@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..files import cdr
-from ..files.bag import read_messages
+from ..files.bags import cdr
+from ..files.bags.bag import read_messages
 from ..files.run_scene import read_run_scene, run_scene_text
 from ..model import errors
 from ..model.errors import ModelError, ModelErrors

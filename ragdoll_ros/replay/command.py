@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..files.bag import read_messages
+from ..files.bags.bag import read_messages
 from ..files.run_scene import versions
 from ..fit.skin import skins_of
 from ..model import errors

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..files.bag import read_messages
-from ..files.cdr import STRING, decode_string
+from ..files.bags.bag import read_messages
+from ..files.bags.cdr import STRING, decode_string
 from ..files.run_scene import read_run_scene, scene_digest
 from ..model import errors
 from ..model.scene import Scene

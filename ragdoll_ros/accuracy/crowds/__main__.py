@@ -11,7 +11,8 @@ import time
 
 import numpy as np
 
-from ...files.scene import load_scene, repeated_placements
+from ...files.repeat import repeated
+from ...files.scene import load_scene
 from ...model.push import Push
 from ...model.scene import Placement, Scene
 from ...physics.accuracy import ACCURACIES
@@ -32,7 +33,7 @@ def grid(count: int, **placed: object) -> Scene:
     drop = load_scene('drop')
     first = Placement(drop.dolls[0].doll, **placed)
     return dataclasses.replace(drop, name='grid', dolls=tuple(
-        repeated_placements(first, {'count': count, 'grid': (SPACING, SPACING, 0.0)})))
+        repeated(first, {'count': count, 'grid': (SPACING, SPACING, 0.0)})))
 
 
 def turning(count: int, first: int = 0) -> Scene:

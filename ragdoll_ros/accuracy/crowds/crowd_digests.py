@@ -8,7 +8,8 @@ import subprocess
 import sys
 from collections import Counter
 
-from ...files.scene import load_scene, repeated_placements
+from ...files.repeat import repeated
+from ...files.scene import load_scene
 from ...model.push import Push
 from ...model.scene import Placement, Scene
 from ...physics.simulation import Simulation
@@ -23,10 +24,10 @@ def sixty() -> Scene:
     """A lone doll, 50 dolls on their faces, most of them soon asleep, and 9 that fall onto them."""
     drop = load_scene('drop')
     doll = drop.dolls[0].doll
-    lying = repeated_placements(
+    lying = repeated(
         Placement(doll, 'doll', (0.0, 0.0, 0.12), (0.0, 1.0, 0.0, 1.0)),
         {'count': 50, 'grid': (2.5, 2.5, 0.0), 'columns': (10, 5), 'turned': 'yaw', 'seed': 1})
-    falling = repeated_placements(
+    falling = repeated(
         Placement(doll, 'falling', (1.0, 0.0, 0.8), spin=(0.2, 0.3, 0.0)),
         {'count': 9, 'grid': (7.5, 5.0, 0.5), 'columns': (3, 3)})
     lone = Placement(doll, 'lone', (-20.0, 0.0, 0.0), spin=(0.2, 0.3, 0.0))

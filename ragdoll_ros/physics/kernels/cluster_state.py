@@ -18,7 +18,7 @@ CONTACT = np.dtype([
     ('rolling_friction', float), ('restitution', float),
     ('normal_velocity', float), ('impulse', float, 5), ('persistent', np.int64),
     ('start_velocity', float, 5), ('spin', float)], align=True)
-"""A contact of two bodies (``body_b`` -1: the ground), or a joint at a limit.
+"""A contact of two bodies (``body_b`` WORLD: the ground or a static geom), or a joint at a limit.
 
 kind: see contact_kind.py. dof, limit_sign: of a limit, its degree of freedom and the direction back
 inside. id: the same from step to step; patch: the same for all points of one contact patch. point,

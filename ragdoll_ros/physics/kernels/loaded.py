@@ -3,6 +3,6 @@ from .compiling.cache import alone
 
 with alone():
     from . import advance
-    from .collision import sweep_and_prune
+    from .collision import aabb_tree, sweep_and_prune
 
-__all__ = ['advance', 'sweep_and_prune']
+__all__ = ['aabb_tree', 'advance', 'sweep_and_prune']

@@ -13,17 +13,17 @@ GEOM = np.dtype([
     ('orientation', float, 4), ('bounding_radius', float), ('reach', float), ('friction', float),
     ('rolling_friction', float), ('restitution', float), ('first_point', np.int64),
     ('point_count', np.int64)], align=True)
-"""A convex shape of a body. ``kind`` and ``size``: see collision/shapes.py. ``position``, m, and
-``orientation``: of the shape's center and axes from the body's center of mass, along the doll's
-axes in the bind pose. ``bounding_radius``: of the sphere around it; ``reach``: from the body's
-center of mass to its farthest point, m. ``friction``, ``rolling_friction`` (m) and ``restitution``:
-against the ground. ``first_point``, ``point_count``: its own among all points that may touch the
-ground."""
+"""A convex shape of a body, or of the WORLD. ``kind`` and ``size``: see collision/shapes.py.
+``position``, m, and ``orientation``: of the shape's center and axes from the body's center of mass,
+along the doll's axes in the bind pose; of static ones in the world. ``bounding_radius``: of the
+sphere around it; ``reach``: from the body's center of mass to its farthest point, m. ``friction``,
+``rolling_friction`` (m) and ``restitution``: against the ground. ``first_point``, ``point_count``:
+its own among all points that may touch the ground."""
 
 GEOM_PAIR = np.dtype([
     ('a', np.int64), ('b', np.int64), ('friction', float), ('rolling_friction', float),
     ('restitution', float)], align=True)
-"""Two geoms that may collide, and the parameters of their contact."""
+"""Two geoms that may collide, and the parameters of their contact; a static one is ``b``."""
 
 JOINT_LIMIT = np.dtype([('q', np.int64), ('dof', np.int64), ('lower', float), ('upper', float)],
                        align=True)
@@ -45,11 +45,11 @@ System = collections.namedtuple(
 dynamics/body.py. ``gravity`` (3,) m/s^2. ``dof_parent`` (nv,): the next degree of freedom towards
 the root, -1 at its end; ``dof_body`` (nv,); ``dof_damping`` (nv,) N m s/rad. ``body_last_dof``
 (n,): the last degree of freedom that moves a body; ``body_root`` (n,): the record of its doll's
-root; ``body_doll`` (n,). ``geoms``, ``pairs`` (of geoms that may collide), ``joint_limits``.
-``ground_normal`` (3,), ``ground_offset`` (1,) m, -inf: no ground. ``restitution_speed`` (1,) m/s:
-slower impacts do not bounce. ``doll_masses`` (d,) kg. ``energy_scale`` (1,) J: m g L of the whole
-system, L the largest reach. ``flight_enabled`` (1,): whether joint damping allows explicit
-integration."""
+root; ``body_doll`` (n,). ``geoms``, static ones last; ``pairs`` (of geoms that may collide),
+``joint_limits``. ``ground_normal`` (3,), ``ground_offset`` (1,) m, -inf: no ground.
+``restitution_speed`` (1,) m/s: slower impacts do not bounce. ``doll_masses`` (d,) kg.
+``energy_scale`` (1,) J: m g L of the whole system, L the largest reach. ``flight_enabled`` (1,):
+whether joint damping allows explicit integration."""
 
 OVERLAPPING, JOINT_OUTSIDE_LIMITS = 1, 2
 """Flags, why a pair is excluded from collision for now: its geoms overlap, as they did at the

@@ -92,10 +92,10 @@ displacement of position correction. ``sums_before``, ``sums_after``, ``external
 dolls. ``bracket`` (1,) with the gaps at its ends. ``spin`` (3,) rad/s: scratch."""
 
 Flight = collections.namedtuple(
-    'Flight', 'kinematics q v stages derivative armed motion')
+    'Flight', 'kinematics q v stages derivative contact_gaps motion')
 """A step of flight: ``kinematics``, ``q`` and ``v`` at an instant of it; state derivatives of all
-``stages`` (16, nq + nv) and a ``derivative`` (nq + nv,); ``armed``: gaps that count as contacts
-when they close; ``motion`` (n,)."""
+``stages`` (16, nq + nv) and a ``derivative`` (nq + nv,); ``contact_gaps``:
+at which gaps count as contacts; ``motion`` (n,)."""
 
 Workspace = collections.namedtuple('Workspace', 'contacts island step flight stats excluded gaps')
 """Scratch for clusters of one system; ``stats``, ``excluded`` and ``gaps`` are the cluster's."""
@@ -121,7 +121,8 @@ def make_workspace(system: System, cluster: ClusterState) -> Workspace:
         spin=np.zeros(3))
     flight = Flight(
         kinematics=kinematics(), q=np.zeros(nq), v=np.zeros(nv), stages=np.zeros((16, nq + nv)),
-        derivative=np.zeros(nq + nv), armed=np.zeros(gaps), motion=np.zeros(bodies, FLIGHT_MOTION))
+        derivative=np.zeros(nq + nv), contact_gaps=np.zeros(gaps),
+        motion=np.zeros(bodies, FLIGHT_MOTION))
     found = Contacts(
         found=np.zeros(contacts, CONTACT), start=np.zeros(contacts, CONTACT),
         gaps_end=np.zeros(gaps), gaps_active=np.zeros(gaps),

@@ -8,11 +8,12 @@ import numpy as np
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
-from ...model import rotation
+from ...model import rotation, static_body
 from ...model.pose import Pose
 from ...model.push import Push
 from ...model.ragdoll import DEFAULT_COLOR, Ragdoll
 from ...model.scene import Scene
+from ...model.shapes import Part
 from ...model.state import State
 from ...physics.swing.pose import SwingState
 from .convert import count_masses, to_header, to_point, to_pose, to_vector
@@ -28,9 +29,10 @@ MARKER_TYPES = {'box': Marker.CUBE, 'sphere': Marker.SPHERE, 'cylinder': Marker.
 
 
 class SceneMarkers:
-    """The MarkerArray of a scene: shapes of its bones, rods of its swings, arrows of the pushes.
+    """The MarkerArray of a scene: shapes of its bones and of its static bodies, rods of its swings,
+    arrows of the pushes.
 
-    Bones and rods have a template; the few arrows are serialized for each message.
+    All but the few arrows have a template.
     """
 
     def __init__(self, scene: Scene, frame: str) -> None:
@@ -40,6 +42,9 @@ class SceneMarkers:
         self._bones = np.array([index for index, _ in parts])
         self._part_poses = Pose(np.array([part.position for _, part in parts]),
                                 np.array([part.orientation for _, part in parts]))
+        self._static = [(body, part) for body in scene.bodies for part in body.primitives]
+        self._static_poses = np.array([(*part.position, *part.orientation)
+                                       for _, part in self._static]).reshape(-1, 7)
         self._arrow_count = 0
         self._is_first = True
 
@@ -49,7 +54,8 @@ class SceneMarkers:
 
         The first message deletes all markers of the last scene.
         """
-        poses = np.concatenate(state.poses(self._bones).compose(self._part_poses), axis=1)
+        poses = np.concatenate([np.concatenate(
+            state.poses(self._bones).compose(self._part_poses), axis=1), self._static_poses])
         ends = np.zeros((0, 3)) if swings is None else np.stack(
             [swings.roots, swings.positions], axis=1).reshape(-1, 3)
         template = self._make_template(first=True) if self._is_first else self._template
@@ -71,6 +77,9 @@ class SceneMarkers:
         poses = [array.append(id(placement.doll), scene.qualified(placement, ''),
                               partial(_part_markers, header, placement.doll))
                  for placement in scene.dolls]
+        if self._static:
+            poses.append(array.append('static', '', lambda _: _static_markers(
+                header, self._static)))
         masses, ends = count_masses(scene), np.zeros(0, int)
         if masses:
             ends = array.append('swings', '', lambda _: _rod_marker(
@@ -110,6 +119,20 @@ def _part_markers(header: Header, doll: Ragdoll, name: str) -> tuple[list[Marker
         marker = Marker(header=header, ns=name + bone.name, id=number, type=MARKER_TYPES[part.kind],
                         action=Marker.ADD, pose=to_pose(row), scale=to_vector(part.size))
         set_color(marker, bone.color or DEFAULT_COLOR)
+        markers.append(marker)
+    return markers, poses
+
+
+def _static_markers(header: Header, parts: Sequence[tuple[static_body.StaticBody, Part]]
+                    ) -> tuple[list[Marker], np.ndarray]:
+    """Markers of the parts of static bodies, and their poses (p, 7)."""
+    poses = sentinels(1, (len(parts), 7))
+    markers = []
+    for number, ((body, part), row) in enumerate(zip(parts, poses.tolist(), strict=True)):
+        marker = Marker(header=header, ns=f'bodies/{body.name}', id=number,
+                        type=MARKER_TYPES[part.kind], action=Marker.ADD, pose=to_pose(row),
+                        scale=to_vector(part.size))
+        set_color(marker, body.color or static_body.DEFAULT_COLOR)
         markers.append(marker)
     return markers, poses
 

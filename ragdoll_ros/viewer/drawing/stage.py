@@ -8,9 +8,11 @@ import viser
 
 from ...model import rotation
 from ...model.scene import Scene
+from ...model.static_body import DEFAULT_COLOR
 from ..sources.source import Frame
-from .bodies import WXYZ, Bodies
+from .bodies import WXYZ, Bodies, linear
 from .joint_limits import JointLimits
+from .meshes import MESHES, box
 from .overlays import Overlays
 from .skin_meshes import SkinMeshes
 
@@ -28,6 +30,9 @@ KEY, RIM = (2.0, -2.4, 3.6), (-2.2, 1.6, 1.4)
 """Where the light comes from, and the one from behind that lets edges stand out from the ground;
 any length. Seen from the home view the first one is at the left, so shadows lie at the right."""
 
+FLAT = MESHES | {'box': box()}
+"""Meshes of static bodies: walls and stairs have sharp edges."""
+
 COARSER = 4
 """Cells per section; in a wide scene sections become cells, one level or more up."""
 
@@ -40,6 +45,7 @@ class Stage:
         server.scene.remove_by_name('/scene')
         self._server, self._dark = server, False
         draw_ground(server, self.scene, dark=False)
+        draw_static_bodies(server, self.scene)
         self.skins = SkinMeshes(server, self.scene)
         self.bodies = Bodies(server, self.scene, frame.state, self.skins.skinned)
         self._overlays = Overlays(server)
@@ -86,6 +92,23 @@ def draw_ground(server: viser.ViserServer, scene: Scene, dark: bool) -> None:
         '/scene/ground', infinite_grid=True, cell_size=cell, section_size=COARSER * cell,
         fade_distance=fade, plane_opacity=1.0, **(DARK if dark else LIGHT),
         wxyz=orientation[WXYZ], position=normal * scene.ground.offset)
+
+
+def draw_static_bodies(server: viser.ViserServer, scene: Scene) -> None:
+    """Draw the static bodies, their parts of one kind in one batch."""
+    parts = [(part, body.color or DEFAULT_COLOR)
+             for body in scene.bodies for part in body.primitives]
+    for kind in MESHES:
+        chosen = [(part, color[:3]) for part, color in parts if part.kind == kind]
+        if chosen:
+            own, colors = zip(*chosen, strict=True)
+            server.scene.add_batched_meshes_simple(
+                f'/scene/static/{kind}', *FLAT[kind],
+                np.array([part.orientation for part in own])[:, WXYZ],
+                np.array([part.position for part in own]),
+                batched_scales=np.array([part.size for part in own]),
+                batched_colors=np.round(linear(np.array(colors)) * 255).astype(np.uint8),
+                lod='off')
 
 
 def configure_lights(server: viser.ViserServer) -> None:

@@ -34,7 +34,8 @@ def build_system(scene: Scene) -> System:
     geoms = _geoms(scene, tree)
     return System(
         tree=tree, gravity=np.array(scene.gravity, float), **_dofs(tree, layout.sizes[1]),
-        geoms=geoms, pairs=pairs_between(scene, _within_dolls(scene)), joint_limits=limits,
+        geoms=geoms, pairs=make_pairs(_within_dolls(scene), contact_laws(scene)),
+        joint_limits=limits,
         ground_normal=np.array(ground.normal if ground else (0.0, 0.0, 1.0)),
         ground_offset=np.array([ground.offset if ground else -math.inf]),
         restitution_speed=np.array([scene.material.restitution_speed]),
@@ -84,8 +85,9 @@ def _energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float])
     return np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*gravity)])
 
 
-def join_systems(systems: Sequence[System], pairs: np.ndarray) -> System:
-    """Concatenate systems, and add ``pairs`` (p,), GEOM_PAIR, between their geoms."""
+def join_systems(systems: Sequence[System], pairs: np.ndarray,
+                 static_geoms: np.ndarray) -> System:
+    """Concatenate systems and ``static_geoms``, GEOM, and add ``pairs`` (p,), GEOM_PAIR."""
     q = v = bodies = dolls = geoms = points = 0
     parts = []
     for one in systems:
@@ -112,16 +114,22 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray) -> System:
     whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in (
         'tree', 'dof_parent', 'dof_body', 'dof_damping', 'body_last_dof', 'body_root', 'body_doll',
         'geoms', 'joint_limits', 'doll_masses')}
+    energy_scale = _energy_scale(whole['tree'], whole['geoms'], parts[0].gravity)
+    whole['geoms'] = np.concatenate([whole['geoms'], static_geoms])
     return parts[0]._replace(
-        **whole, pairs=np.concatenate([*(part.pairs for part in parts), pairs]),
-        energy_scale=_energy_scale(whole['tree'], whole['geoms'], parts[0].gravity),
+        **whole, energy_scale=energy_scale,
+        pairs=np.concatenate([*(part.pairs for part in parts), pairs]),
         flight_enabled=np.array([min(part.flight_enabled[0] for part in parts)]))
 
 
-def pairs_between(scene: Scene, geom_pairs: np.ndarray) -> np.ndarray:
-    """GEOM_PAIR records of pairs of geoms (p, 2), with the parameters of their contact."""
-    laws = np.array([scene.material.on(bone) for bone in scene.bones
+def contact_laws(scene: Scene) -> np.ndarray:
+    """Friction, rolling friction, m, and restitution (g, 3) of each geom of a scene's dolls."""
+    return np.array([scene.material.on(bone) for bone in scene.bones
                      for _ in bone.shape.parts]).reshape(-1, 3)
+
+
+def make_pairs(geom_pairs: np.ndarray, laws: np.ndarray) -> np.ndarray:
+    """GEOM_PAIR records of pairs of geoms (p, 2), by the ``laws`` (g, 3) of their materials."""
     pairs = np.zeros(len(geom_pairs), GEOM_PAIR)
     if len(geom_pairs):
         pairs['a'], pairs['b'] = geom_pairs.T
@@ -173,10 +181,10 @@ def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
     for geom, (index, bone, part) in zip(geoms, parts, strict=True):
         shape, count = part.shape, GROUND_POINTS[part.shape.kind]
         geom['body'], geom['kind'] = record[index], SHAPE_KIND[shape.kind]
-        geom['size'] = _size(shape)
+        geom['size'] = geom_size(shape)
         geom['position'] = rotation.rotate(bone.orientation, np.array(part.position))
         geom['orientation'] = rotation.multiply(bone.orientation, np.array(part.orientation))
-        geom['bounding_radius'] = _bounding_radius(shape)
+        geom['bounding_radius'] = bounding_radius(shape)
         geom['reach'] = geom['bounding_radius'] + math.hypot(*part.position)
         law = contact_law(np.array(scene.material.on(bone)), base)
         geom['friction'], geom['rolling_friction'], geom['restitution'] = law
@@ -185,14 +193,14 @@ def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
     return geoms
 
 
-def _size(shape: object) -> tuple[float, ...]:
+def geom_size(shape: object) -> tuple[float, ...]:
     """GEOM size of a shape; see kernels/collision/shapes.py."""
     if shape.kind == 'box':
         return shape.half_extents
     return (shape.radius, 0.0 if shape.kind == 'sphere' else shape.length / 2, 0.0)
 
 
-def _bounding_radius(shape: object) -> float:
+def bounding_radius(shape: object) -> float:
     """Radius, m, of the bounding sphere about the shape's center."""
     if shape.kind == 'sphere':
         return shape.radius

@@ -17,9 +17,10 @@ from ...kernels.system import System
 from ...kernels.workspace import Workspace, make_workspace
 from ..protocol import GROUND
 from .broad_phase import NO_PAIRS
-from .build_system import build_system, join_systems, pairs_between
+from .build_system import build_system, contact_laws, join_systems, make_pairs
 from .doll_states import SNAPSHOT, DollStates, contact_capacity
 from .islands import LARGE_CLUSTER, next_window
+from .static_geoms import NO_KEYS, StaticGeoms
 
 SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'contacts_dropped',
                 'toi_failures', 'restitution_reduced', 'energy_gains', 'work_pushes', 'work_grabs',
@@ -36,12 +37,14 @@ PARTS_PER_THREAD = 4
 
 @dataclass
 class Cluster:
-    """Dolls that are integrated as one system."""
+    """Dolls that are integrated as one system, with what static geoms are near."""
 
     dolls: np.ndarray
     """(d,) in the scene's order."""
     pairs: np.ndarray
     """(k, 2) of dolls that may touch."""
+    static_keys: np.ndarray
+    """(s,) pairs of bones and static geoms that may touch, see static_geoms.py."""
     bones: np.ndarray
     """(n,) indices in the scene."""
     q_indices: np.ndarray
@@ -72,7 +75,7 @@ class Clusters:
 
     def __init__(self, scene: Scene, layout: DofLayout, workers: int) -> None:
         self._scene = scene
-        self._systems = _systems(scene)
+        self._systems, self._laws = _each_doll(scene)
         self._q = [np.arange(own.start, own.stop) for own in layout.doll_q]
         self._v = [np.arange(own.start, own.stop) for own in layout.doll_v]
         self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
@@ -100,6 +103,7 @@ class Clusters:
         self.members = list(self._singles)
         self.of_doll = np.arange(len(scene.dolls))
         """(d,) index in ``members`` of the cluster of each doll."""
+        self.static_geoms = StaticGeoms(scene, self.reach())
         self._set_clusters(self.members)
 
     def __iter__(self) -> object:
@@ -116,7 +120,7 @@ class Clusters:
     @property
     def all_alone(self) -> bool:
         """Whether each doll is a cluster by itself."""
-        return not self._multi_doll
+        return not len(self.pairs)
 
     def covers(self, pairs: np.ndarray) -> bool:
         """Whether all these pairs (k, 2) of dolls are pairs of the clusters."""
@@ -128,22 +132,20 @@ class Clusters:
         for one, other in pairs:
             low, high = sorted((label[one], label[other]))
             label[label == high] = low
-        old = {self._cluster_key(cluster.dolls, cluster.pairs): cluster for cluster in self.members}
+        old = {_cluster_key(cluster.dolls, cluster.pairs, cluster.static_keys): cluster
+               for cluster in self.members}
         made = []
         for first in np.unique(label):
             dolls = np.flatnonzero(label == first)
             own = pairs[label[pairs[:, 0]] == first] if len(pairs) else NO_PAIRS
-            cluster = old.pop(self._cluster_key(dolls, own), None)
-            made.append(cluster or (self._join(dolls, own) if len(dolls) > 1
-                                    else self._singles[dolls[0]]))
-            if cluster is None:
-                _invalidate(made[-1])
+            cluster = old.pop(_cluster_key(dolls, own, self.static_geoms.keys_of(dolls)), None)
+            made.append(cluster or self._make(dolls, own))
         self._set_clusters(made)
 
     def advance(self, duration: float, accuracy: Accuracy, sleeping: np.ndarray) -> None:
         """Advance all clusters by ``duration`` s, except those of ``sleeping`` dolls (d,)."""
         jobs, whole = self._jobs, ~sleeping[self._firsts]
-        for cluster in self._multi_doll if duration else ():
+        for cluster in self._joined if duration else ():
             place = self.of_doll[cluster.dolls[0]]
             if not whole[place]:
                 continue
@@ -158,7 +160,7 @@ class Clusters:
             kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)
         else:
             self._advance_parallel(jobs, duration, accuracy, self._firsts[whole])
-        for cluster in self._multi_doll:
+        for cluster in self._joined:
             if whole[self.of_doll[cluster.dolls[0]]]:
                 self._scatter_state(cluster)
 
@@ -167,7 +169,7 @@ class Clusters:
         own = dolls[self._doll_of_v]
         self.v[own] = velocities[own]
         self._states.arrays['dense_step'][dolls] = 0
-        for cluster in self._multi_doll:
+        for cluster in self._joined:
             if dolls[cluster.dolls[0]]:
                 cluster.state.v[:] = velocities[cluster.v_indices]
                 cluster.state.dense_step[:] = 0
@@ -187,8 +189,8 @@ class Clusters:
         np.add.at(self.stats['work_pushes'], self._firsts[self.of_doll], energies)
 
     def gather_state(self) -> None:
-        """Copy the scene's q and v into the clusters of several dolls."""
-        for cluster in self._multi_doll:
+        """Copy the scene's q and v into the clusters that have their own."""
+        for cluster in self._joined:
             cluster.state.q[:] = self.q[cluster.q_indices]
             cluster.state.v[:] = self.v[cluster.v_indices]
 
@@ -202,7 +204,10 @@ class Clusters:
         return [cluster.state.excluded & kind for cluster in self._singles]
 
     def separate(self) -> None:
-        """Make each doll a cluster by itself, and invalidate their contacts, gaps and steps."""
+        """Make each doll a cluster by itself, with nothing near, and invalidate their contacts,
+        gaps and steps.
+        """
+        self.static_geoms.clear()
         self._set_clusters(list(self._singles))
         self.invalidate()
 
@@ -236,15 +241,17 @@ class Clusters:
         (c, 2) of the scene that touch, or GROUND, and the length (c,) s of the step.
         """
         if len(self._singles) == 1:
-            found, dt = self._contacts_of_one(), self._singles[0].state.stats['last_dt'][0]
+            found, dt = self._contacts_of_one(), self.stats['last_dt'][0]
             return _contact_points(found, self._bone_of_body, np.zeros(len(found), np.int64),
                                    np.full(len(found), dt))
-        arrays, single = self._states.arrays, np.bincount(self.of_doll)[self.of_doll] == 1
+        arrays, single = self._states.arrays, np.ones(len(self._singles), bool)
+        for cluster in self._joined:
+            single[cluster.dolls] = False
         known, dolls = self._states.contacts_of(single & (arrays['dense_step']['valid'] == 0))
         found = [_contact_points(arrays['contacts'][known], self._bone_of_body, self._first[dolls],
                                  self.stats['last_dt'][dolls])]
         for cluster in itertools.chain.from_iterable(
-                cluster.islands or [cluster] for cluster in self._multi_doll):
+                cluster.islands or [cluster] for cluster in self._joined):
             stats = cluster.state.stats[0]
             if not cluster.state.dense_step['valid'][0]:
                 known = cluster.state.contacts[:stats['contact_count']]
@@ -267,19 +274,20 @@ class Clusters:
 
     def _contacts_of_one(self) -> np.ndarray:
         """Contacts, and joints at their limits, of the last step of a scene of one doll."""
-        state = self._singles[0].state
+        state = self.members[0].state
         return state.contacts[:0 if state.dense_step['valid'][0]
                               else int(state.stats['contact_count'][0])]
 
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
-        return (self._states.save(), self.members,
-                [_saved(cluster) for cluster in self._multi_doll])
+        return (self._states.save(), self.members, self.static_geoms.save(),
+                [_saved(cluster) for cluster in self._joined])
 
     def restore(self, snapshot: tuple) -> None:
         """Restore a snapshot."""
-        states, members, several = snapshot
+        states, members, near, several = snapshot
         self._states.restore(states)
+        self.static_geoms.restore(near)
         if members is not self.members:
             self._set_clusters(members)
         for saved in several:
@@ -293,7 +301,7 @@ class Clusters:
         """Restore states of clusters to the bit; the clusters must still be the same."""
         for cluster, *rest in saved:
             _restore(cluster, *rest)
-            if len(cluster.dolls) > 1:
+            if not self._is_single(cluster):
                 self._scatter_state(cluster)
 
     def checkpoint(self) -> dict[str, np.ndarray]:
@@ -310,16 +318,17 @@ class Clusters:
         """A unique number of each pair (k, 2)."""
         return pairs[:, 0] * len(self._singles) + pairs[:, 1]
 
-    def _cluster_key(self, dolls: np.ndarray, pairs: np.ndarray) -> tuple:
-        return dolls.tobytes(), pairs.tobytes()
+    def _is_single(self, cluster: Cluster) -> bool:
+        """Whether a cluster's state is a view of the scene's; of others it is copied there."""
+        return cluster is self._singles[cluster.dolls[0]]
 
     def _set_clusters(self, clusters: list[Cluster]) -> None:
         self.members = clusters
         for place, cluster in enumerate(clusters):
             self.of_doll[cluster.dolls] = place
-        self._multi_doll = [cluster for cluster in clusters if len(cluster.dolls) > 1]
+        self._joined = [cluster for cluster in clusters if not self._is_single(cluster)]
         self._firsts = np.array([cluster.dolls[0] for cluster in clusters])
-        self.pairs = np.concatenate([NO_PAIRS, *(cluster.pairs for cluster in self._multi_doll)])
+        self.pairs = np.concatenate([NO_PAIRS, *(cluster.pairs for cluster in self._joined)])
         """(k, 2) of dolls that may touch, of all clusters."""
         self._keys_of_pairs = frozenset(self._pair_keys(self.pairs).tolist())
         self._jobs = np.array([[cluster.job(worker) for cluster in clusters]
@@ -365,7 +374,7 @@ class Clusters:
             kernels.advance(np.array([island.job(0) for island in made.values()]), window,
                             accuracy.step, accuracy.flight_error)
             for island in made.values():
-                if len(island.dolls) > 1:
+                if not self._is_single(island):
                     self._scatter_state(island)
             cluster.state.q[:] = self.q[cluster.q_indices]
             cluster.state.v[:] = self.v[cluster.v_indices]
@@ -387,8 +396,7 @@ class Clusters:
             made[key] = before.get(key)
             if made[key] is None:
                 own = cluster.pairs[np.isin(cluster.pairs, dolls).all(axis=1)]
-                made[key] = (self._join(dolls, own) if len(dolls) > 1 else self._singles[dolls[0]])
-                _invalidate(made[key])
+                made[key] = self._make(dolls, own)
         return made
 
     def _excluded(self, cluster: Cluster) -> list[np.ndarray]:
@@ -414,28 +422,67 @@ class Clusters:
                 make_workspace(system, state) for _ in range(self._workers)]
         workspaces = [one._replace(stats=state.stats, excluded=state.excluded, gaps=state.gaps)
                       for one in self._workspaces[id(system)]]
-        return _bind_cluster(np.array([doll]), NO_PAIRS, bones, q, v, system, state, workspaces)
+        return _bind_cluster(np.array([doll]), NO_PAIRS, NO_KEYS, bones, q, v, system, state,
+                             workspaces)
 
-    def _join(self, dolls: np.ndarray, pairs: np.ndarray) -> Cluster:
-        """A cluster of several dolls, with their present coordinates and velocities."""
+    def _make(self, dolls: np.ndarray, pairs: np.ndarray) -> Cluster:
+        """A cluster of ``dolls`` with their present coordinates and velocities."""
+        keys = self.static_geoms.keys_of(dolls)
+        made = (self._join(dolls, pairs, keys) if len(dolls) > 1 or len(keys)
+                else self._singles[dolls[0]])
+        _invalidate(made)
+        return made
+
+    def _join(self, dolls: np.ndarray, pairs: np.ndarray, keys: np.ndarray) -> Cluster:
+        """A cluster that has a state of its own; ``keys``: what static geoms are near."""
         systems = [self._systems[doll] for doll in dolls]
         bones, q, v = (np.concatenate([parts[doll] for doll in dolls])
                        for parts in (self._bones, self._q, self._v))
-        firsts = np.cumsum([0, *(len(system.geoms) for system in systems)])
-        place = {int(doll): k for k, doll in enumerate(dolls)}
-        geoms = np.concatenate([
-            np.stack(np.meshgrid(np.arange(firsts[a], firsts[a + 1]),
-                                 np.arange(firsts[b], firsts[b + 1]), indexing='ij'), -1)
-            .reshape(-1, 2) for one, other in pairs
-            for a, b in [(place[int(one)], place[int(other)])]])
-        scene = dataclasses.replace(
-            self._scene, dolls=tuple(self._scene.dolls[doll] for doll in dolls))
-        system = join_systems(systems, pairs_between(scene, geoms))
+        touching, static_geoms = self._static_pairs(systems, bones, keys)
+        geom_pairs = np.concatenate([_pairs_of_dolls(dolls, systems, pairs), touching])
+        laws = np.concatenate([*(self._laws[doll] for doll in dolls),
+                               self.static_geoms.laws[static_geoms]])
+        system = join_systems(systems, make_pairs(geom_pairs, laws),
+                              self.static_geoms.geoms[static_geoms])
         state = make_cluster_state(system, contact_capacity(system))._replace(
             q=self.q[q], v=self.v[v], stats=self.stats[dolls[0]:dolls[0] + 1],
             excluded=np.concatenate([self._singles[doll].state.excluded for doll in dolls]))
-        return _bind_cluster(dolls, pairs, bones, q, v, system, state,
+        return _bind_cluster(dolls, pairs, keys, bones, q, v, system, state,
                              [make_workspace(system, state)])
+
+    def _static_pairs(self, systems: list[System], bones: np.ndarray,
+                      keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs (p, 2) of geoms of joined ``systems`` with static ones, which follow them; and
+        these, indices (s,) among the scene's.
+        """
+        bone_of_geom = np.concatenate([
+            own[system.tree['bone'][system.geoms['body']]] for system, own in zip(
+                systems, np.split(bones, np.cumsum([len(one.tree) for one in systems])[:-1]),
+                strict=True)])
+        near_bones, near_geoms = self.static_geoms.bones_and_geoms(keys)
+        static_geoms, place = np.unique(near_geoms, return_inverse=True)
+        # Geoms are in the order of bones.
+        begin = np.searchsorted(bone_of_geom, near_bones)
+        count = np.searchsorted(bone_of_geom, near_bones, side='right') - begin
+        geoms = np.repeat(begin - np.cumsum(count) + count, count) + np.arange(count.sum())
+        return np.stack([geoms, len(bone_of_geom) + np.repeat(place, count)], 1), static_geoms
+
+
+def _pairs_of_dolls(dolls: np.ndarray, systems: list[System], pairs: np.ndarray) -> np.ndarray:
+    """All pairs (p, 2) of the geoms of ``dolls`` (d,) with the ``systems`` that ``pairs`` (k, 2)
+    of dolls connect; geoms count through all systems.
+    """
+    firsts = np.cumsum([0, *(len(system.geoms) for system in systems)])
+    place = {int(doll): k for k, doll in enumerate(dolls)}
+    return np.concatenate([NO_PAIRS, *(
+        np.stack(np.meshgrid(np.arange(firsts[a], firsts[a + 1]),
+                             np.arange(firsts[b], firsts[b + 1]), indexing='ij'), -1)
+        .reshape(-1, 2) for one, other in pairs
+        for a, b in [(place[int(one)], place[int(other)])])])
+
+
+def _cluster_key(dolls: np.ndarray, pairs: np.ndarray, keys: np.ndarray) -> tuple:
+    return dolls.tobytes(), pairs.tobytes(), keys.tobytes()
 
 
 def _invalidate(cluster: Cluster) -> None:
@@ -467,13 +514,17 @@ def _bind_cluster(*parts: object) -> Cluster:
     return Cluster(*parts, [bind(part) for part in (system, state, *workspaces)])
 
 
-def _systems(scene: Scene) -> list[System]:
-    """The system of each doll by itself; equal dolls share theirs."""
-    made: dict[int, System] = {}
+def _each_doll(scene: Scene) -> tuple[list[System], list[np.ndarray]]:
+    """The system of each doll by itself, and the contact laws of its geoms; equal dolls share
+    theirs.
+    """
+    made: dict[int, tuple[System, np.ndarray]] = {}
     for placement in scene.dolls:
         if id(placement.doll) not in made:
-            made[id(placement.doll)] = build_system(dataclasses.replace(scene, dolls=(placement,)))
-    return [made[id(placement.doll)] for placement in scene.dolls]
+            alone = dataclasses.replace(scene, dolls=(placement,), bodies=())
+            made[id(placement.doll)] = build_system(alone), contact_laws(alone)
+    each = [made[id(placement.doll)] for placement in scene.dolls]
+    return [system for system, _ in each], [laws for _, laws in each]
 
 
 def _contact_points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,

@@ -219,17 +219,28 @@ class RigidEngine:
         self._clusters.close()
 
     def _update_clusters(self, duration: float) -> None:
-        """Form clusters of the dolls that may touch within ``duration`` s, and wake sleeping ones
-        among them. Sleeping dolls in contact stay in one cluster.
+        """Form clusters of the dolls that may touch within ``duration`` s, with the static geoms
+        near them, and wake sleeping dolls among them. Sleeping dolls in contact stay together.
         """
-        if len(self.scene.dolls) == 1:
-            return
+        clusters = self._clusters
+        pairs = self._pairs_to_form(duration) if len(self.scene.dolls) > 1 else None
+        moved = clusters.static_geoms.update(clusters.bone_states, duration, ~self.sleeping)
+        if pairs is not None:
+            clusters.form(pairs)
+            self._age = 0
+        elif moved:
+            clusters.form(clusters.pairs)
+
+    def _pairs_to_form(self, duration: float) -> np.ndarray | None:
+        """Pairs (k, 2) of dolls of which clusters are to be formed; None: they hold. Wakes dolls
+        that may be touched.
+        """
         clusters = self._clusters
         near = self._near_pairs(duration)
         self._age += 1
         if (clusters.covers(near) and not self.sleeping[near].any()
                 and (self._age <= MAX_AGE or clusters.all_alone)):
-            return
+            return None
         while True:
             near = self._near_pairs(max(duration, LOOK_AHEAD))
             if not self.sleeping[near].any():
@@ -237,8 +248,7 @@ class RigidEngine:
             self._wake(near)
         asleep = clusters.pairs
         asleep = asleep[self.sleeping[asleep].all(axis=1)]
-        clusters.form(np.unique(np.concatenate([near, asleep]), axis=0))
-        self._age = 0
+        return np.unique(np.concatenate([near, asleep]), axis=0)
 
     def _wake(self, dolls: np.ndarray) -> None:
         """Wake dolls, indices or a mask (d,)."""

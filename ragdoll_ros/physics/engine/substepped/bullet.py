@@ -7,6 +7,7 @@ enables by default, are disabled.
 import math
 import os
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,9 @@ from ....model import errors, rotation
 from ....model.coordinates import GeneralizedState
 from ....model.ragdoll import Bone, Ragdoll
 from ....model.scene import Placement, Scene, finite_friction
+from ....model.shapes import Shape
 from ....model.state import State
+from ....model.static_body import StaticBody
 from ...accuracy import Accuracy
 from ...rigid_body import damping_rate
 from ..protocol import GROUND, AppliedWrench, Contacts, Wrenches, allowed_penetration
@@ -52,6 +55,9 @@ MOST_COORDINATES = 128
 MAX_DAMPING_STEP = 1.5
 """Bound on substep times damping rate; explicit damping is unstable from 2 on."""
 
+_GEOMS = {'sphere': pybullet.GEOM_SPHERE, 'box': pybullet.GEOM_BOX,
+          'cylinder': pybullet.GEOM_CYLINDER, 'capsule': pybullet.GEOM_CAPSULE}
+
 _FLAGS = (pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER)
 
 
@@ -73,7 +79,7 @@ class _Doll:
 
 
 class _World:
-    """Builds ground and dolls of a scene in a PyBullet client, with their initial velocities."""
+    """Builds a scene in a PyBullet client, its dolls with their initial velocities."""
 
     def __init__(self, scene: Scene, client: int) -> None:
         self.scene, self._client = scene, client
@@ -82,19 +88,31 @@ class _World:
             deterministicOverlappingPairs=1, enableFileCaching=0, useSplitImpulse=0, contactSlop=0,
             physicsClientId=client)
         pybullet.setGravity(*scene.gravity, physicsClientId=client)
-        self.ground = self._add_ground()
+        self.static = [*self._add_ground(), *self._add_bodies()]
+        """Bodies that never move."""
         self.dolls = [self._add_doll(placement) for placement in scene.dolls]
 
-    def _add_ground(self) -> int | None:
+    def _add_ground(self) -> Iterator[int]:
         ground = self.scene.ground
         if ground is None:
-            return None
+            return
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_PLANE, planeNormal=ground.normal, physicsClientId=self._client)
         body = pybullet.createMultiBody(0, shape, -1, [n * ground.offset for n in ground.normal],
                                         physicsClientId=self._client)
         self._set_material(body, -1, None)
-        return body
+        yield body
+
+    def _add_bodies(self) -> Iterator[int]:
+        """Add each part of the static bodies as a body of its own."""
+        for one in self.scene.bodies:
+            for part in one.parts:
+                shape = pybullet.createCollisionShape(
+                    _GEOMS[part.kind], physicsClientId=self._client, **_sizes(part.shape))
+                body = pybullet.createMultiBody(0, shape, -1, part.position, part.orientation,
+                                                physicsClientId=self._client)
+                self._set_material(body, -1, one)
+                yield body
 
     def _add_doll(self, placement: Placement) -> _Doll:
         doll = placement.doll
@@ -151,8 +169,8 @@ class _World:
             pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0,
                                            physicsClientId=self._client)
 
-    def _set_material(self, body: int, link: int, bone: Bone | None) -> None:
-        """Set friction and restitution of a link, or of the ground.
+    def _set_material(self, body: int, link: int, bone: Bone | StaticBody | None) -> None:
+        """Set friction and restitution of a link or a static body, or of the ground (None).
 
         PyBullet multiplies the coefficients of both bodies, hence the square roots; for rolling
         friction it adds each body's coefficient times the other's sliding friction.
@@ -202,11 +220,10 @@ class BulletEngine(SubsteppedEngine):
 
     def _adopt(self, world: _World) -> None:
         """Map PyBullet's bodies and links to dolls and bones, and set the initial state."""
-        self._ground, self._dolls = world.ground, world.dolls
+        self._dolls = world.dolls
         self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
         self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
-        if self._ground is not None:
-            self._doll_of[self._ground] = GROUND
+        self._doll_of |= dict.fromkeys(world.static, GROUND)
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
         self.set_coordinates(self.coordinates)
 
@@ -365,3 +382,11 @@ class BulletEngine(SubsteppedEngine):
                                     pybullet.WORLD_FRAME, physicsClientId=self._client)
         pybullet.applyExternalTorque(body, link, torque.tolist(), pybullet.WORLD_FRAME,
                                      physicsClientId=self._client)
+
+
+def _sizes(shape: Shape) -> dict[str, object]:
+    """A shape's sizes as arguments of createCollisionShape."""
+    if shape.kind == 'box':
+        return {'halfExtents': shape.half_extents}
+    return {'radius': shape.radius} | (
+        {} if shape.kind == 'sphere' else {'height': shape.length})

@@ -9,6 +9,7 @@ from ..collision.narrow_phase import collide
 from ..collision.shapes import CYLINDER
 from ..compiling.decorators import compiled
 from ..contact_kind import FRICTIONAL, LIMIT, ROLLING
+from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
@@ -58,7 +59,7 @@ def write_ground_contact(s: System, kin: Kinematics, k: int, point: int, id_: in
     """
     geom, normal = s.geoms[k], vec(s.ground_normal)
     c.kind = ROLLING if geom.rolling_friction > 0 else FRICTIONAL
-    c.body_a, c.body_b, c.id, c.patch = geom.body, -1, id_, k
+    c.body_a, c.body_b, c.id, c.patch = geom.body, WORLD, id_, k
     put(c.point, ground_point(geom, point, kin.geom_positions[k], kin.geom_rotations[k], normal))
     put(c.normal, normal)
     high = -s.ground_offset[0]
@@ -74,7 +75,7 @@ def write_limit(s: System, q: np.ndarray, k: int, side: int, id_: int, c: np.rec
     """Write to ``c`` joint limit k, lower (``side`` 0) or upper (1); ``id_``: index of its gap."""
     limit = s.joint_limits[k]
     c.kind, c.id, c.patch = LIMIT, id_, -1
-    c.body_a, c.body_b, c.dof = s.dof_body[limit.dof], -1, limit.dof
+    c.body_a, c.body_b, c.dof = s.dof_body[limit.dof], WORLD, limit.dof
     c.limit_sign = 1.0 if side == 0 else -1.0
     c.gap = q[limit.q] - limit.lower if side == 0 else limit.upper - q[limit.q]
     c.friction = c.rolling_friction = c.restitution = 0.0
@@ -206,5 +207,5 @@ def had_met(s: System, contacts: np.ndarray, count: int, id_: int) -> bool:
 
 @compiled
 def doll_of(s: System, body: int) -> int:
-    """Index of a body's doll, -1 of the ground's."""
+    """Index of a body's doll, -1 for the WORLD."""
     return s.body_doll[body] if body >= 0 else -1

@@ -12,6 +12,7 @@ import numpy as np
 from ..collision.narrow_phase import separation
 from ..collision.shapes import BOX, CAPSULE, SPHERE, Shape, extent, shape_at
 from ..compiling.decorators import compiled
+from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics, body_velocity, forward_kinematics, place_geoms
 from ..maths.vectors import Vec3, divide, dot, norm, sub, to_local, vec
 from ..system import JOINT_OUTSIDE_LIMITS, OVERLAPPING, System
@@ -69,7 +70,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     n, narrow_phases = 0, 0
     for k in range(len(s.geoms)):
-        if s.ground_offset[0] > -math.inf:
+        if s.geoms[k].point_count and s.ground_offset[0] > -math.inf:
             ground_gaps(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k],
                         vec(s.ground_normal), s.ground_offset[0], out)
         n += s.geoms[k].point_count
@@ -87,8 +88,8 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
             out[n + k] = EXCLUDED
             continue
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
-        least = before[n + k] - 2 * (
-            motion_bound(motion[a.body], a.reach, h) + motion_bound(motion[b.body], b.reach, h))
+        least = before[n + k] - 2 * (geom_motion_bound(motion, a, h)
+                                     + geom_motion_bound(motion, b, h))
         if least > NEAR:
             out[n + k] = least
         else:
@@ -114,8 +115,10 @@ def label_reachable(s: System, ws: Workspace, kin: Kinematics, gaps: np.ndarray,
     first = len(gaps) - len(s.pairs)
     for k in range(len(s.pairs)):
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
+        if b.body == WORLD:
+            continue
         one, other = label[s.body_doll[a.body]], label[s.body_doll[b.body]]
-        reach = motion_bound(motion[a.body], a.reach, h) + motion_bound(motion[b.body], b.reach, h)
+        reach = geom_motion_bound(motion, a, h) + geom_motion_bound(motion, b, h)
         if one != other and gaps[first + k] <= TOUCHING + MOST_SPEEDUP * reach:
             low, high = min(one, other), max(one, other)
             for d in range(len(label)):
@@ -128,6 +131,12 @@ def motion_bound(motion: np.record, reach: float, h: float) -> float:
     """Distance, m, that no point within ``reach`` m of a body's center of mass exceeds in h s."""
     return (h * (motion.speed + motion.angular_speed * reach) + motion.correction
             + motion.correction_angle * reach)
+
+
+@compiled
+def geom_motion_bound(motion: np.ndarray, geom: np.record, h: float) -> float:
+    """Distance, m, that no point of a geom exceeds in h s; ``motion`` (n,) of all bodies."""
+    return 0.0 if geom.body == WORLD else motion_bound(motion[geom.body], geom.reach, h)
 
 
 @compiled

@@ -18,3 +18,6 @@ inertia: principal moments about the center of mass, kg m^2; inertial_orientatio
 relative to the doll's axes (x, y, z, w). parent_to_joint, joint_to_com: from the parent's center of
 mass to the joint and on to the body's own, m; joint_axes: rows; all three along the doll's axes in
 the bind pose. joint_damping: N m s/rad."""
+
+WORLD = -1
+"""In place of the index of a body: what never moves, the ground and static geoms."""

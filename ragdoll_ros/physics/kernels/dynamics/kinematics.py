@@ -16,6 +16,7 @@ from ..compiling.decorators import compiled
 from ..maths.transcendental import sine_and_cosine
 from ..maths.vectors import (Quat, Vec3, add, cross, put, quat, quat_mul, quat_rotate,
                              quat_to_matrix, to_local, vec)
+from .body import WORLD
 
 Kinematics = collections.namedtuple(
     'Kinematics', 'orientations positions spatial_velocities motion_subspaces inertias '
@@ -230,6 +231,10 @@ def place_geoms(tree: np.ndarray, body_root: np.ndarray, geoms: np.ndarray, q: n
     for k in range(len(geoms)):
         geom = geoms[k]
         i = geom.body
+        if i == WORLD:
+            put(kin.geom_positions[k], vec(geom.position))
+            quat_to_matrix(quat(geom.orientation), kin.geom_rotations[k])
+            continue
         turn, root = quat(kin.orientations[i]), root_position(q, tree[body_root[i]].q_start)
         put(kin.geom_positions[k], add(add(root, vec(kin.positions[i])),
                                        quat_rotate(turn, vec(geom.position))))

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
+from ..dynamics.body import WORLD
 from ..dynamics.forward_dynamics import state_derivative
 from ..dynamics.kinematics import body_velocity, forward_kinematics, normalize
 from ..maths.vectors import divide, dot, norm, put, sub, vec
@@ -171,7 +172,8 @@ def acceleration_bounds(s: System, ws: Workspace, cluster: ClusterState) -> tupl
     forward_kinematics(s.tree, flight.q, flight.v, kin)
     for k in range(len(s.geoms)):
         i = s.geoms[k].body
-        motion[i].reach = max(motion[i].reach, s.geoms[k].reach)
+        if i != WORLD:
+            motion[i].reach = max(motion[i].reach, s.geoms[k].reach)
     most = falling = 0.0
     for i in range(len(s.tree)):
         velocity, w = body_velocity(kin, i)

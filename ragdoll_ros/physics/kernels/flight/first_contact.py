@@ -11,6 +11,7 @@ from ..compiling.decorators import compiled
 from ..contact.gaps import (FAR, NEAR, TOUCHING, ground_point, placed_shape,
                             update_kinematics_and_gaps)
 from ..contact.jacobian import root_of
+from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics, body_velocity, velocity_at
 from ..maths.vectors import Vec3, dot, norm, sub, vec
 from ..system import System
@@ -40,29 +41,23 @@ def time_to_close(gap: float, closing: float, acceleration: float) -> float:
 
 
 @compiled
-def gap_to_contact(gaps: np.ndarray, armed: np.ndarray, j: int) -> float:
-    """Gap j left until contact: unarmed, it touched at the start and must penetrate first."""
-    return gaps[j] if armed[j] > 0 else gaps[j] + 2 * TOUCHING
-
-
-@compiled
 def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                          gaps: np.ndarray, acceleration: float,
                          acceleration_in_free_fall: float, end_rates: np.ndarray) -> float:
     """Least time, s, until a gap may close; ``kin`` is that of q and v, with its geoms. Reads
-    flight.armed, overwrites contacts.manifold. No point exceeds ``acceleration``, m/s^2, nor
-    ``acceleration_in_free_fall``, relative to free fall, which a pair counts twice. ``end_rates``
+    flight.contact_gaps, overwrites contacts.manifold. No point exceeds ``acceleration``, m/s^2, nor
+    ``acceleration_in_free_fall``, relative to free fall; two bodies have twice that. ``end_rates``
     (2, nq + nv): state derivatives at the ends of the step, for those of the limited joints.
     """
-    least, n, armed = math.inf, 0, ws.flight.armed
+    least, n, contact = math.inf, 0, ws.flight.contact_gaps
     for k in range(len(s.geoms)):
         geom = s.geoms[k]
-        if s.ground_offset[0] > -math.inf:
+        if geom.point_count and s.ground_offset[0] > -math.inf:
             normal = vec(s.ground_normal)
             velocity, w = body_velocity(kin, geom.body)
             falling = -dot(velocity, normal)
             for j in range(geom.point_count):
-                gap, closing = gap_to_contact(gaps, armed, n + j), falling + w * geom.reach
+                gap, closing = gaps[n + j] - contact[n + j], falling + w * geom.reach
                 if gap < FAR:
                     point = ground_point(geom, j, kin.geom_positions[k], kin.geom_rotations[k],
                                          normal)
@@ -75,14 +70,14 @@ def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarra
         change = (ACCELERATION_FACTOR * max(abs(end_rates[0, at]), abs(end_rates[1, at]))
                   + LEAST_CHANGE)
         if gaps[n] < math.inf:
-            least = min(least, time_to_close(gap_to_contact(gaps, armed, n), -rate, change))
+            least = min(least, time_to_close(gaps[n] - contact[n], -rate, change))
         if gaps[n + 1] < math.inf:
-            least = min(least, time_to_close(gap_to_contact(gaps, armed, n + 1), rate, change))
+            least = min(least, time_to_close(gaps[n + 1] - contact[n + 1], rate, change))
         n += 2
     for k in range(len(s.pairs)):
-        closing = pair_closing_speed(s, ws, kin, q, k, gaps[n + k])
-        least = min(least, time_to_close(gap_to_contact(gaps, armed, n + k), closing,
-                                         2 * acceleration_in_free_fall))
+        bound = (acceleration if s.geoms[s.pairs[k].b].body == WORLD
+                 else 2 * acceleration_in_free_fall)
+        least = min(least, pair_time_to_close(s, ws, kin, q, k, gaps[n + k], contact[n + k], bound))
     return least
 
 
@@ -90,29 +85,35 @@ def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarra
 def normal_velocity(s: System, kin: Kinematics, q: np.ndarray, body: int, point: Vec3,
                     normal: Vec3) -> float:
     """Velocity, m/s, along ``normal`` of a body's point that is at ``point``, m, world."""
+    if body == WORLD:
+        return 0.0
     return dot(normal, velocity_at(kin, body, sub(point, root_of(s, q, body))))
 
 
 @compiled
-def pair_closing_speed(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int,
-                       gap: float) -> float:
-    """Speed, m/s, at which the gap of pair k closes, or an upper bound where it is far."""
+def pair_time_to_close(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int, gap: float,
+                       contact: float, acceleration: float) -> float:
+    """Least time, s, for the ``gap`` of pair k, m, to fall to ``contact``, of all points of its
+    manifold where it is near: another than the nearest may close first.
+    """
     pair, manifold = s.pairs[k], ws.contacts.manifold
     a, b = s.geoms[pair.a], s.geoms[pair.b]
     if gap < NEAR:
-        found = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b),
-                        max(gap, 0.0) + 1e-4, manifold)
+        found = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b), NEAR, manifold)
+        least = math.inf
+        for j in range(found):
+            point, normal = vec(manifold[j].point), vec(manifold[j].normal)
+            closing = (normal_velocity(s, kin, q, b.body, point, normal)
+                       - normal_velocity(s, kin, q, a.body, point, normal))
+            least = min(least, time_to_close(manifold[j].gap - contact, closing, acceleration))
         if found:
-            best = 0
-            for j in range(1, found):
-                if manifold[j].gap < manifold[best].gap:
-                    best = j
-            point, normal = vec(manifold[best].point), vec(manifold[best].normal)
-            return (normal_velocity(s, kin, q, b.body, point, normal)
-                    - normal_velocity(s, kin, q, a.body, point, normal))
+            return least
     one, turn_a = body_velocity(kin, a.body)
-    other, turn_b = body_velocity(kin, b.body)
-    return norm(sub(one, other)) + turn_a * a.reach + turn_b * b.reach
+    closing = norm(one) + turn_a * a.reach
+    if b.body != WORLD:
+        other, turn_b = body_velocity(kin, b.body)
+        closing = norm(sub(one, other)) + turn_a * a.reach + turn_b * b.reach
+    return time_to_close(gap - contact, closing, acceleration)
 
 
 @compiled
@@ -128,19 +129,19 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
     flight, step, gaps = ws.flight, cluster.dense_step[0], ws.contacts.gaps_end
     q, v, kin = flight.q, flight.v, flight.kinematics
     acceleration, relative = acceleration_bounds(s, ws, cluster)
-    arm_gaps(ws)
+    set_contact_gaps(ws)
     time = before = 0.0
     for _ in range(MAX_SAMPLES):
         evaluate_dense_step(s.tree, cluster, time, q, v)
         update_kinematics_and_gaps(s, ws, kin, q, v, gaps, math.inf, gaps)
-        least = least_gap(gaps, flight.armed)
+        least = least_gap(gaps, flight.contact_gaps)
         if least < -CLOSED:
             step.event_time = regula_falsi(s, ws, cluster, before, time)
             return
         if least <= CLOSED:
             step.event_time = time
             return
-        arm_separated(gaps, flight.armed)
+        reset_separated(gaps, flight.contact_gaps)
         safe = time_without_contact(s, ws, kin, q, v, gaps, acceleration, relative,
                                     cluster.end_rates)
         before = time
@@ -154,27 +155,33 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 
 @compiled
-def arm_gaps(ws: Workspace) -> None:
-    """Write flight.armed: 1 for gaps that do not touch, whose closing is a contact, else 0."""
+def set_contact_gaps(ws: Workspace) -> None:
+    """Write flight.contact_gaps, m or rad, at which gaps count as contacts: 0; those that touch now
+    must first penetrate by 2 TOUCHING, and by TOUCHING more than now: else what penetrates already
+    would be a contact at once, and again after each impact.
+    """
     for j in range(len(ws.gaps)):
-        ws.flight.armed[j] = 1.0 if ws.gaps[j] > TOUCHING else 0.0
+        ws.flight.contact_gaps[j] = (
+            0.0 if ws.gaps[j] > TOUCHING else min(ws.gaps[j] + TOUCHING, 0.0) - 2 * TOUCHING)
 
 
 @compiled
-def least_gap(gaps: np.ndarray, armed: np.ndarray) -> float:
-    """Least gap, m or rad, by gap_to_contact()."""
+def least_gap(gaps: np.ndarray, contact_gaps: np.ndarray) -> float:
+    """What is left, m or rad, until the first of the gaps is a contact."""
     least = math.inf
     for j in range(len(gaps)):
-        least = min(least, gap_to_contact(gaps, armed, j))
+        least = min(least, gaps[j] - contact_gaps[j])
     return least
 
 
 @compiled
-def arm_separated(gaps: np.ndarray, armed: np.ndarray) -> None:
-    """Arm gaps that have separated, at an instant before which regula_falsi() will not look."""
+def reset_separated(gaps: np.ndarray, contact_gaps: np.ndarray) -> None:
+    """Let gaps that have separated count as contacts when they close, at an instant before which
+    regula_falsi() will not look.
+    """
     for j in range(len(gaps)):
         if gaps[j] > TOUCHING:
-            armed[j] = 1.0
+            contact_gaps[j] = 0.0
 
 
 @compiled
@@ -188,7 +195,7 @@ def regula_falsi(s: System, ws: Workspace, cluster: ClusterState, early: float,
         evaluate_dense_step(s.tree, cluster, time, flight.q, flight.v)
         update_kinematics_and_gaps(s, ws, flight.kinematics, flight.q, flight.v, gaps, math.inf,
                                    gaps)
-        gap = least_gap(gaps, flight.armed)
+        gap = least_gap(gaps, flight.contact_gaps)
         if turn == 0:
             if gap <= 0:
                 break

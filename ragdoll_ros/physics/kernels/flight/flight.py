@@ -8,6 +8,7 @@ from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts
 from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
 from ..contact_kind import LIMIT
+from ..dynamics.body import WORLD
 from ..dynamics.forward_dynamics import state_derivative
 from ..dynamics.kinematics import forward_kinematics, place_geoms
 from ..maths.vectors import dot, norm, vec
@@ -16,7 +17,7 @@ from ..stepping.work import load_power
 from ..system import System
 from ..workspace import Workspace
 from .dense_step import evaluate_dense_step
-from .first_contact import arm_gaps, normal_velocity, time_without_contact
+from .first_contact import normal_velocity, set_contact_gaps, time_without_contact
 
 SEPARATION_SPEED = 5e-3
 """m/s or rad/s at which contacts separate for a flight: to 1.3 um under gravity, which is what
@@ -60,9 +61,10 @@ def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> 
     update_kinematics_and_gaps(s, ws, kin, q, v, ws.gaps, math.inf, ws.gaps)
     fast = 0.0
     for k in range(len(s.geoms)):
-        turn = vec(kin.spatial_velocities[s.geoms[k].body])
-        fast = max(fast, dot(turn, turn) * s.geoms[k].reach)
-    arm_gaps(ws)
+        if s.geoms[k].body != WORLD:
+            turn = vec(kin.spatial_velocities[s.geoms[k].body])
+            fast = max(fast, dot(turn, turn) * s.geoms[k].reach)
+    set_contact_gaps(ws)
     bound = g + 2 * fast + 1e-3
     return time_without_contact(s, ws, kin, q, v, ws.gaps, bound, bound,
                                 cluster.end_rates) > WORTHWHILE * nominal
@@ -81,9 +83,8 @@ def contacts_separate(s: System, ws: Workspace, cluster: ClusterState, m: int) -
                 return False
             continue
         point, normal = vec(c.point), vec(c.normal)
-        speed = normal_velocity(s, kin, q, c.body_a, point, normal)
-        if c.body_b >= 0:
-            speed -= normal_velocity(s, kin, q, c.body_b, point, normal)
+        speed = (normal_velocity(s, kin, q, c.body_a, point, normal)
+                 - normal_velocity(s, kin, q, c.body_b, point, normal))
         if speed < SEPARATION_SPEED:
             return False
     if leaning:

@@ -70,7 +70,7 @@ def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
     after_step = ws.stats[0].ended_without_impact != 0
     for i in range(ws.step.scalars[0].start_contact_count):
         c = ws.contacts.start[i]
-        if after_step and c.body_b < 0:
+        if after_step and c.patch < len(s.geoms):
             continue
         if is_approaching(c) and not (
                 had_met(s, cluster.contacts, ws.stats[0].contact_count, c.id)):

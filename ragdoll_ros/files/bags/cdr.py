@@ -7,8 +7,8 @@ import struct
 
 import numpy as np
 
-from ..model import errors
-from ..model.scene import SECOND
+from ...model import errors
+from ...model.scene import SECOND
 
 STRING, POSE_ARRAY = 'std_msgs/msg/String', 'geometry_msgs/msg/PoseArray'
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from ..model import errors
+from ...model import errors
 
 NO_MCAP = "MCAP files need mcap: pip install 'ragdoll_ros[replay]'"
 

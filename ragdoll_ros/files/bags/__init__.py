@@ -1,0 +1,1 @@
+"""Messages of recorded bags: MCAP and SQLite storage, and their CDR encoding."""

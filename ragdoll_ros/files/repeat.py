@@ -1,0 +1,53 @@
+"""`repeat:` of a doll or a body in a scene: copies in a row, on a grid, scattered, or all of it."""
+import dataclasses
+import math
+from typing import TypeVar
+
+import numpy as np
+
+from ..model import rotation
+from ..model.scene import Placement
+from ..model.static_body import StaticBody
+
+Placed = TypeVar('Placed', Placement, StaticBody)
+
+
+def repeated(first: Placed, repeat: dict) -> list[Placed]:
+    """Copies of a doll or a body, named ``name_1`` on; ``repeat`` as in scene.schema.json.
+
+    Each copy is ``shift`` farther than the one before. A grid starts at the first's position and
+    fills x, then y, then z; each copy is then moved by up to half of ``spread`` along each axis.
+    The same seed gives the same copies. ``turned: yaw`` rotates by up to 180 degrees about the
+    vertical through the doll's centre of mass or the body's origin, any other by a random rotation
+    about the origin of its frame.
+    """
+    count, rng = int(repeat['count']), np.random.default_rng(int(repeat.get('seed', 0)))
+    columns = repeat.get('columns') or [math.ceil(math.sqrt(count))] * 2
+    wide, deep = (int(number) for number in columns)
+    grid, spread, shift = (np.array(repeat.get(key, (0.0, 0.0, 0.0)), float)
+                           for key in ('grid', 'spread', 'shift'))
+    copies = []
+    for k in range(count):
+        cell = np.array([k % wide, k // wide % deep, k // (wide * deep)])
+        place = (np.array(first.position) + cell * grid + k * shift
+                 + spread * rng.uniform(-0.5, 0.5, 3))
+        turn: tuple[float, ...] = first.orientation
+        if repeat.get('turned') == 'yaw':
+            place, turn = _yawed(first, place, rng.uniform(0, math.pi))
+        elif repeat.get('turned'):
+            turn = tuple(rotation.normalized(rng.normal(size=4)))
+        copies.append(dataclasses.replace(first, name=f'{first.name}_{k + 1}',
+                                          position=tuple(place.tolist()), orientation=turn))
+    return copies
+
+
+def _yawed(first: Placement | StaticBody, place: np.ndarray,
+           angle: float) -> tuple[np.ndarray, tuple[float, ...]]:
+    """Position (3,) m and orientation of a copy, rotated by ``angle`` rad about the vertical
+    through its centre of mass or origin; before, its frame is at ``place``.
+    """
+    turn = rotation.from_axis_angle((0.0, 0.0, 1.0), angle)
+    center = first.doll.mass_centre if isinstance(first, Placement) else np.zeros(3)
+    arm = rotation.rotate(first.orientation, center)
+    orientation = rotation.normalized(rotation.multiply(turn, np.array(first.orientation)))
+    return place + arm - rotation.rotate(turn, arm), tuple(orientation.tolist())

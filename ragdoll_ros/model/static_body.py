@@ -1,0 +1,77 @@
+"""StaticBody: what a scene has beside its dolls and the ground and never moves: a stair, a wall."""
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import errors
+from .compound import Compound
+from .errors import set_fields
+from .pose import Pose
+from .rotation import IDENTITY
+from .shapes import Part, Shape, Solid
+from .vectors import Quaternion, Vector, finite_floats, unit_vector
+
+DEFAULT_COLOR = (0.76, 0.78, 0.81, 1.0)
+"""Red, green, blue and opacity of bodies that have no colour: between the ground's and a doll's."""
+
+
+@dataclass(frozen=True)
+class StaticBody:
+    """A shape at a fixed pose in the world frame.
+
+    Args:
+        name: unique among bodies and dolls of the scene.
+        shape: a Sphere, Box, Cylinder, Capsule, or a Compound of them.
+        position: (3,) m, of the shape's origin.
+        orientation: quaternion x, y, z, w, shape's axes to world axes; normalised.
+        friction: Coulomb's coefficient, 0 or more; None: that of the scene's material.
+        rolling_friction: lever arm, m, 0 or more; None: that of the scene's material.
+        restitution: 0 to 1; None: that of the scene's material.
+        color: red, green, blue, opacity, 0 to 1; None: DEFAULT_COLOR.
+
+    Raises:
+        NotFinite, NotUnit, WrongForm, OutOfRange: for its fields.
+
+    Example:
+        >>> StaticBody('wall', Box((0.1, 2, 2)), position=(1, 0, 1), friction=0.5).shape.kind
+        'box'
+    """
+
+    name: str
+    shape: Shape | Compound
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation: Quaternion = IDENTITY
+    friction: float | None = None
+    rolling_friction: float | None = None
+    restitution: float | None = None
+    color: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        set_fields(self, position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation,
+                                           'a quaternion x, y, z, w, not zero', 4))
+        if not isinstance(self.shape, Solid | Compound):
+            raise errors.WrongForm('shape', self.shape, 'a shape, or a Compound of shapes')
+        for key, most in (('friction', np.inf), ('rolling_friction', 1e6), ('restitution', 1)):
+            if getattr(self, key) is not None:
+                errors.check_range(key, getattr(self, key), 0, most)
+        if self.color is not None:
+            set_fields(self, color=finite_floats('color', self.color, 4))
+            for part in self.color:
+                errors.check_range('color', part, 0, 1)
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of its shape, world frame."""
+        return Pose(np.array(self.position), np.array(self.orientation))
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Its primitive shapes at their poses in the world frame."""
+        return tuple(Part.at(part.shape, self.pose.compose(part.pose)) for part in self.shape.parts)
+
+    @property
+    def primitives(self) -> tuple[Part, ...]:
+        """Boxes, cylinders and spheres to draw, at their poses in the world frame."""
+        return tuple(Part.at(piece.shape, self.pose.compose(piece.pose))
+                     for piece in self.shape.primitives)

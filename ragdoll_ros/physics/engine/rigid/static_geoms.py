@@ -1,0 +1,112 @@
+"""StaticGeoms: the geoms of a scene's static bodies, and which of them bones may touch soon."""
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....model import rotation
+from ....model.scene import Scene
+from ....model.shapes import Part, support_distance
+from ...kernels.collision.shapes import SHAPE_KIND
+from ...kernels.dynamics.body import WORLD
+from ...kernels.loaded import aabb_tree
+from ...kernels.system import GEOM
+from .build_system import bounding_radius, geom_size
+
+LOOK_AHEAD = 0.1
+"""s: what a bone may touch within this time is given to its cluster, when it has to be made anew;
+then it is made anew less often."""
+
+NO_KEYS = np.zeros(0, np.int64)
+
+
+class StaticGeoms:
+    """The g static geoms of a scene. Which of them a bone may touch is known by doll: what is near
+    one doll does not depend on others, and neither do its last digits.
+
+    A pair of a bone and a geom has the key bone * g + geom.
+    """
+
+    def __init__(self, scene: Scene, reach: np.ndarray) -> None:
+        parts = [(body, part) for body in scene.bodies for part in body.parts]
+        self.geoms = np.zeros(len(parts), GEOM)
+        self.laws = np.zeros((len(parts), 3))
+        """(g, 3): friction, rolling friction, m, and restitution of each geom."""
+        for k, (geom, (body, part)) in enumerate(zip(self.geoms, parts, strict=True)):
+            geom['body'], geom['kind'] = WORLD, SHAPE_KIND[part.kind]
+            geom['size'] = geom_size(part.shape)
+            geom['position'], geom['orientation'] = part.position, part.orientation
+            geom['bounding_radius'] = bounding_radius(part.shape)
+            self.laws[k] = scene.material.on(body)
+        self._tree = _make_tree([part for _, part in parts]) if parts else None
+        self._reach = np.ascontiguousarray(reach)
+        self._doll_of_bone = scene.doll_of_bone
+        self._first_keys = len(parts) * np.array(
+            [*(own.start for own in scene.bone_slices), len(scene.bones)])
+        self._found = np.zeros(4 * len(scene.bones), np.int64)
+        self._keys = NO_KEYS
+
+    def update(self, states: np.ndarray, duration: float, moving: np.ndarray) -> bool:
+        """See that all pairs that may touch within ``duration`` s are known, of ``moving`` dolls
+        (d,). Returns whether others are than before. ``states`` (n, 13) of all bones.
+        """
+        if self._tree is None:
+            return False
+        near = self._find(states, duration, moving)
+        place = np.searchsorted(self._keys, near)
+        known = np.take(self._keys, place, mode='clip') == near if len(self._keys) else np.zeros(
+            len(near), bool)
+        if known.all():
+            return False
+        changed = np.zeros(len(moving), bool)
+        changed[self._dolls_of(near[~known])] = True
+        kept = self._keys[~changed[self._dolls_of(self._keys)]]
+        self._keys = np.sort(np.concatenate([
+            kept, self._find(states, max(duration, LOOK_AHEAD), changed)]))
+        return True
+
+    def keys_of(self, dolls: np.ndarray) -> np.ndarray:
+        """The known pairs (k,) of ``dolls`` (d,), indices in ascending order."""
+        if not len(self._keys):
+            return NO_KEYS
+        begin, end = (np.searchsorted(self._keys, self._first_keys[dolls + after])
+                      for after in (0, 1))
+        return np.concatenate([self._keys[i:j] for i, j in zip(begin, end, strict=True)])
+
+    def bones_and_geoms(self, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The bones and the geoms (k,) of pairs."""
+        return np.divmod(keys, max(1, len(self.geoms)))
+
+    def clear(self) -> None:
+        """Forget all pairs."""
+        self._keys = NO_KEYS
+
+    def save(self) -> np.ndarray:
+        """A snapshot of the known pairs."""
+        return self._keys
+
+    def restore(self, keys: np.ndarray) -> None:
+        """Restore a snapshot."""
+        self._keys = keys
+
+    def _dolls_of(self, keys: np.ndarray) -> np.ndarray:
+        """The doll (k,) of each pair."""
+        return self._doll_of_bone[keys // len(self.geoms)]
+
+    def _find(self, states: np.ndarray, ahead: float, moving: np.ndarray) -> np.ndarray:
+        """Pairs (k,) that may touch within ``ahead`` s, of ``moving`` dolls (d,), sorted."""
+        count = aabb_tree.find_near(self._tree, states, self._reach, moving[self._doll_of_bone],
+                                    ahead, self._found)
+        if count > len(self._found):
+            self._found = np.zeros(2 * count, np.int64)
+            return self._find(states, ahead, moving)
+        return np.sort(self._found[:count])
+
+
+def _make_tree(parts: Sequence[Part]) -> object:
+    """The tree of the bounding boxes of ``parts`` at their poses in the world."""
+    terms = np.array([part.shape.support_terms for part in parts])
+    # Row i of a rotation matrix is the world's axis i in the part's frame.
+    axes = rotation.matrix([part.orientation for part in parts])
+    half = support_distance(terms[:, None], axes)
+    center = np.array([part.position for part in parts])
+    return aabb_tree.make_aabb_tree(center - half, center + half)
