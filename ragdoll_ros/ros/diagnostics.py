@@ -92,6 +92,7 @@ class Diagnostics:
         warnings = [counts.last_reason] if refused else []
         if values['namesakes']:
             warnings.append(f'{values["namesakes"] + 1} nodes have this name')
+        warnings += filter(None, [values['unheard_cmd_vel']])
         warnings += self._lag_warnings(requested, values)
         bad, self._last_bad = values['bad_states'] - self._last_bad, values['bad_states']
         if bad:

@@ -217,8 +217,11 @@ class RagdollNode(Node):
         self._restart_ticker()
 
     def _on_graph_timer(self) -> None:
-        """Check for duplicate nodes; while paused, serve new subscribers of /clock and /tf."""
+        """Check for duplicate nodes and for publishers that are not heard; while paused, serve new
+        subscribers of /clock and /tf.
+        """
         self._duplicate_nodes.update()
+        self.inputs.cmd_vel.check_publishers()
         if self.paused:
             self._outputs.republish(self.simulation, self.stamp)
 
@@ -281,6 +284,7 @@ class RagdollNode(Node):
         return {'paused': self.paused, 'real_time_factor': settings.real_time_factor,
                 'lost_time': ticker.dropped_time / 1e9, 'dropped_ticks': ticker.dropped_ticks,
                 'stamp_pace': stamp_factor, 'namesakes': self._duplicate_nodes.count,
+                'unheard_cmd_vel': self.inputs.cmd_vel.unheard,
                 'stamp_of_zero': self.stamp - round(self.simulation.time / stamp_factor),
                 **self.recovery.diagnostics()}
 

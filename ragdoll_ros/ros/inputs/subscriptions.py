@@ -1,4 +1,4 @@
-"""Subscriptions that push: Wrench and WrenchStamped become a Push, Twist becomes a Drive.
+"""Subscriptions that push: wrenches become a Push, a Twist or TwistStamped becomes a Drive.
 
 Input that is not finite or names an unknown bone is refused; a vector that is too long is clamped
 and keeps its direction. Both are counted.
@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
+from geometry_msgs.msg import Twist, TwistStamped, Vector3, Wrench, WrenchStamped
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 
 from ...model import errors
 from ...model.drive import MAX_FORCE, MAX_SPEED, MAX_TORQUE, Drive
@@ -17,6 +18,7 @@ from ...model.ragdoll import WORLD
 from ...model.scene import Scene
 from ...model.vectors import Vector, clamp_norm
 from ..parameters.node_settings import NodeSettings
+from .cmd_vel import CmdVelSubscription
 from .input_counts import InputCounts
 
 TORQUE_ARM = 0.1
@@ -45,11 +47,26 @@ class PushSubscriptions:
     def __init__(self, node: Node, counts: InputCounts, name: str = '~') -> None:
         self._counts = counts
         self.simulation: PushTarget
-        self.settings: NodeSettings
-        self.subscriptions = [
+        self._settings: NodeSettings
+        self.cmd_vel = CmdVelSubscription(node, self.on_cmd_vel, self.on_stamped_cmd_vel)
+        self._wrenches = [
             node.create_subscription(Wrench, f'{name}/force', self.on_force, 10),
-            node.create_subscription(Twist, 'cmd_vel', self.on_cmd_vel, 10),
             node.create_subscription(WrenchStamped, f'{name}/push', self.on_push, 10)]
+
+    @property
+    def settings(self) -> NodeSettings:
+        """Values of the node's parameters; the type of cmd_vel is one of them."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: NodeSettings) -> None:
+        self._settings = settings
+        self.cmd_vel.subscribe(settings.stamped_cmd_vel)
+
+    @property
+    def subscriptions(self) -> list[Subscription]:
+        """All of them."""
+        return [*self._wrenches, *filter(None, [self.cmd_vel.subscription])]
 
     def on_force(self, message: Wrench) -> None:
         """Push the pushed bone in the world frame; a zero wrench ends the push."""
@@ -78,6 +95,16 @@ class PushSubscriptions:
                 self.simulation.release('cmd_vel')
         except errors.ModelError as error:
             self._counts.refuse('cmd_vel', error)
+
+    def on_stamped_cmd_vel(self, message: TwistStamped) -> None:
+        """As on_cmd_vel; without a frame, as by many keyboards, it is in the world frame."""
+        frame = message.header.frame_id
+        if frame in ('', WORLD, self.settings.frame_id):
+            self.on_cmd_vel(message.twist)
+        else:
+            self._counts.refuse('cmd_vel', errors.WrongForm(
+                'header.frame_id', frame,
+                f'{self.settings.frame_id} or none: velocities are along the world axes'))
 
     def on_push(self, message: WrenchStamped) -> None:
         """Push the pushed bone in the world frame, or the bone of frame_id in its own frame."""

@@ -46,6 +46,8 @@ class NodeSettings:
         0.1, 'Simulated time that a push acts unless the next one comes first, s', (0.001, 60.0))
     cmd_vel_timeout: float = _parameter(
         0.6, 'Simulated time that a message on cmd_vel acts, s', (0.001, 60.0))
+    stamped_cmd_vel: bool = _parameter(
+        False, "Take TwistStamped on cmd_vel, Nav2's default since Kilted, instead of Twist")
     force_per_speed: float = _parameter(
         FORCE_PER_SPEED, 'Force per velocity error of the pushed bone to cmd_vel, N/(m/s)',
         (0.0, 1e5))
