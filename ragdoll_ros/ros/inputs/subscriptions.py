@@ -10,6 +10,7 @@ from typing import Protocol
 from geometry_msgs.msg import Twist, TwistStamped, Vector3, Wrench, WrenchStamped
 from rclpy.node import Node
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import MultiDOFJointState
 
 from ...model import errors
 from ...model.drive import MAX_FORCE, MAX_SPEED, MAX_TORQUE, Drive
@@ -20,9 +21,13 @@ from ...model.vectors import Vector, clamp_norm
 from ..parameters.node_settings import NodeSettings
 from .cmd_vel import CmdVelSubscription
 from .input_counts import InputCounts
+from .wrench_at import TOPIC as WRENCH_AT
+from .wrench_at import pushes_at
 
 TORQUE_ARM = 0.1
 """m: the largest torque is max_force times this."""
+
+MAX_TORQUE_NAME = f'{TORQUE_ARM:g} m times max_force'
 
 
 class PushTarget(Protocol):
@@ -38,7 +43,7 @@ class PushTarget(Protocol):
 
 
 class PushSubscriptions:
-    """Subscriptions to ~/force, cmd_vel and ~/push; each topic is a channel of pushes.
+    """Subscriptions to ~/force, cmd_vel, ~/push and ~/wrench_at; each topic is a channel of pushes.
 
     ``name`` is the name of the node that is pushed, for another node that listens as well. All are
     reliable: a best-effort subscription lost 3 of 40 messages that were sent right after matching.
@@ -51,7 +56,9 @@ class PushSubscriptions:
         self.cmd_vel = CmdVelSubscription(node, self.on_cmd_vel, self.on_stamped_cmd_vel)
         self._wrenches = [
             node.create_subscription(Wrench, f'{name}/force', self.on_force, 10),
-            node.create_subscription(WrenchStamped, f'{name}/push', self.on_push, 10)]
+            node.create_subscription(WrenchStamped, f'{name}/push', self.on_push, 10),
+            node.create_subscription(MultiDOFJointState, f'{name}/wrench_at', self.on_wrench_at,
+                                     10)]
 
     @property
     def settings(self) -> NodeSettings:
@@ -118,20 +125,41 @@ class PushSubscriptions:
         bone = frame if local else settings.pushed_bone
         self._push('~/push', f'push {frame if local else WORLD}', bone, message.wrench, local)
 
+    def on_wrench_at(self, message: MultiDOFJointState) -> None:
+        """Push bones at points of theirs, all that the message names or none."""
+        try:
+            for channel, push in pushes_at(message, self.simulation.scene, self.settings.frame_id,
+                                           self.settings.push_timeout, self._limited_at):
+                self._push_or_release(push, channel)
+        except errors.ModelError as error:
+            self._counts.refuse(WRENCH_AT, error)
+
     def _push(self, source: str, channel: str, bone: str, wrench: Wrench,
               local: bool = False) -> None:
         """Apply a wrench for push_timeout; ``local``: in the bone's own frame."""
         limit = self.settings.max_force
         try:
             force = self._limited(source, 'force', wrench.force, limit, 'max_force')
-            torque = self._limited(source, 'torque', wrench.torque, limit * TORQUE_ARM, 'max_force')
-            if any(force) or any(torque):
-                self.simulation.push(Push(bone, force, torque, local=local,
-                                          duration=self.settings.push_timeout), channel)
-            else:
-                self.simulation.release(channel)
+            torque = self._limited(source, 'torque', wrench.torque, limit * TORQUE_ARM,
+                                   MAX_TORQUE_NAME)
+            self._push_or_release(Push(bone, force, torque, local=local,
+                                       duration=self.settings.push_timeout), channel)
         except errors.ModelError as error:
             self._counts.refuse(source, error)
+
+    def _push_or_release(self, push: Push, channel: str) -> None:
+        """Apply a push; one without force and torque ends the last one of its channel."""
+        if any(push.force) or any(push.torque):
+            self.simulation.push(push, channel)
+        else:
+            self.simulation.release(channel)
+
+    def _limited_at(self, name: str, vector: Vector3) -> Vector:
+        """Force or torque of ~/wrench_at, by the end of its name."""
+        limit, limit_name = self.settings.max_force, 'max_force'
+        if name.endswith('torque'):
+            limit, limit_name = limit * TORQUE_ARM, MAX_TORQUE_NAME
+        return self._limited(WRENCH_AT, name, vector, limit, limit_name)
 
     def _limited(self, source: str, name: str, vector: Vector3, limit: float,
                  limit_name: str) -> Vector:
