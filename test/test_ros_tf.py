@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from message_packages import build
 from peer import end, kill, start
 from std_srvs.srv import SetBool
-from tf2_msgs_build import build
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.files.urdf_tree import parse_urdf
@@ -29,7 +29,7 @@ def tf2_msgs(ros, tmp_path_factory):
     """What processes that are started from now on need to import tf2_msgs."""
     with pytest.MonkeyPatch.context() as patch:
         if importlib.util.find_spec('tf2_msgs') is None:
-            for name, path in build(tmp_path_factory.mktemp('tf2_msgs')).items():
+            for name, path in build(tmp_path_factory.mktemp('built'), 'tf2_msgs').items():
                 patch.setenv(name, os.pathsep.join(filter(None, [path, os.environ.get(name)])))
         yield
 

@@ -285,6 +285,7 @@ class RagdollNode(Node):
                 'lost_time': ticker.dropped_time / 1e9, 'dropped_ticks': ticker.dropped_ticks,
                 'stamp_pace': stamp_factor, 'namesakes': self._duplicate_nodes.count,
                 'unheard_cmd_vel': self.inputs.cmd_vel.unheard,
+                'humans': self._outputs.humans.status,
                 'stamp_of_zero': self.stamp - round(self.simulation.time / stamp_factor),
                 **self.recovery.diagnostics()}
 

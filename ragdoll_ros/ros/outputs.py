@@ -17,6 +17,7 @@ from visualization_msgs.msg import MarkerArray
 
 from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
+from .humans.publishers import Humans
 from .latched_topic import LATCHED_HISTORY, LatchedTopic
 from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
 from .messages.measures import TickMeasures, checksum, serialize_measures
@@ -49,6 +50,7 @@ class Outputs:
         self._markers = LatchedTopic(node, MarkerArray, '~/markers')
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._tf = TfPublisher(node)
+        self.humans = Humans(node)
         self._clock: Publisher | None = None
 
     def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
@@ -59,6 +61,7 @@ class Outputs:
         self._pending: list[Callable[[Simulation, int], None]] = []
         """What has not published the last tick, for want of subscribers."""
         self._tf.set_scene(scene, frame, publish_tf)
+        self.humans.set_scene(scene, frame, publish_tf)
         description = scene_to_urdf(scene, frame)
         self._urdf = checksum(description)
         self._description.publish(String(data=description))
@@ -67,6 +70,7 @@ class Outputs:
     def has_subscribers(self) -> bool:
         """Whether a topic that is published with each tick has a subscriber."""
         return (self._clock is not None or self._tf.has_subscribers
+                or self.humans.has_subscribers
                 or any(topic is not None and topic.has_subscribers
                        for topic in (self._measures, self._poses, self._swings))
                 or any(topic.get_subscription_count()
@@ -82,6 +86,7 @@ class Outputs:
         """
         self.publish_clock(stamp)
         self._tf.publish(simulation, stamp)
+        self.humans.publish(simulation, stamp)
         templates = self._templates
         if self._state.get_subscription_count():
             state = simulation.state

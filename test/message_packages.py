@@ -1,6 +1,6 @@
-"""tf2_msgs built from its one message by the generators of ROS's wheels, as PyPI has no tf2_msgs.
+"""Message packages that PyPI does not have, built by the generators of ROS's wheels.
 
-python test/tf2_msgs_build.py FOLDER
+python test/message_packages.py FOLDER tf2_msgs hri_msgs
 """
 from __future__ import annotations
 
@@ -18,47 +18,54 @@ GENERATORS = [f'ros-jazzy-{name}' for name in (
     'rosidl-core-generators', 'rosidl-default-generators', 'rosidl-generator-py')]
 TOOLS = ['catkin_pkg', 'cmake', 'empy<4', 'lark', 'ninja', 'numpy', 'setuptools<80']
 
-FILES = {
-    'msg/TFMessage.msg': 'geometry_msgs/TransformStamped[] transforms\n',
-    'package.xml': """<package format="3">
-  <name>tf2_msgs</name> <version>0.36.0</version> <description>TFMessage</description>
+MESSAGES = {
+    'tf2_msgs': ('geometry_msgs', 'TFMessage', 'geometry_msgs/TransformStamped[] transforms'),
+    'hri_msgs': ('std_msgs', 'IdsList', 'std_msgs/Header header\nstring[] ids')}
+"""Of each package what it depends on, and its message that is used here."""
+
+PACKAGE = """<package format="3">
+  <name>{name}</name> <version>0.36.0</version> <description>{message}</description>
   <maintainer email="tf2@example.org">nobody</maintainer> <license>BSD</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <buildtool_depend>rosidl_default_generators</buildtool_depend>
-  <depend>geometry_msgs</depend>
+  <depend>{needed}</depend>
   <member_of_group>rosidl_interface_packages</member_of_group>
   <export><build_type>ament_cmake</build_type></export>
 </package>
-""",
-    'CMakeLists.txt': """cmake_minimum_required(VERSION 3.20)
-project(tf2_msgs)
+"""
+
+CMAKE = """cmake_minimum_required(VERSION 3.20)
+project({name})
 find_package(ament_cmake REQUIRED)
-find_package(geometry_msgs REQUIRED)
+find_package({needed} REQUIRED)
 find_package(rosidl_default_generators REQUIRED)
-rosidl_generate_interfaces(tf2_msgs msg/TFMessage.msg DEPENDENCIES geometry_msgs)
+rosidl_generate_interfaces({name} msg/{message}.msg DEPENDENCIES {needed})
 ament_package()
-"""}
+"""
 
 
-def build(folder: Path) -> dict[str, str]:
-    """Build in a folder, with an environment of its own; what a process needs to import it."""
+def build(folder: Path, *names: str) -> dict[str, str]:
+    """Build packages in a folder, with an environment of its own; what a process needs of them."""
     tools, prefix = folder / 'environment', folder / 'prefix'
     _run(sys.executable, '-m', 'venv', tools)
     _run(tools / 'bin/pip', 'install', '--quiet', *TOOLS, *GENERATORS)
     site = next(tools.glob('lib/python3*/site-packages'))
     _mend(tools / 'share', site)
-    for name, text in FILES.items():
-        path = folder / 'source' / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
     places = {'PATH': f'{tools}/bin:{os.environ["PATH"]}', 'LD_LIBRARY_PATH': f'{tools}/lib',
               'AMENT_PREFIX_PATH': str(tools), 'CMAKE_PREFIX_PATH': f'{tools}:{site}',
               'PYTHONPATH': ''}
     python = tools / 'bin/python'
-    _run(tools / 'bin/cmake', '-S', folder / 'source', '-B', folder / 'build', '-G', 'Ninja',
-         f'-DCMAKE_INSTALL_PREFIX={prefix}', '-DBUILD_TESTING=OFF',
-         f'-DPython3_EXECUTABLE={python}', f'-DPYTHON_EXECUTABLE={python}', **places)
-    _run(tools / 'bin/cmake', '--build', folder / 'build', '--target', 'install', **places)
+    for name in names:
+        source, made = folder / name, folder / f'build_{name}'
+        needed, message, text = MESSAGES[name]
+        for path, content in ((f'msg/{message}.msg', f'{text}\n'), ('package.xml', PACKAGE),
+                              ('CMakeLists.txt', CMAKE)):
+            (source / path).parent.mkdir(parents=True, exist_ok=True)
+            (source / path).write_text(content.format(name=name, message=message, needed=needed))
+        _run(tools / 'bin/cmake', '-S', source, '-B', made, '-G', 'Ninja',
+             f'-DCMAKE_INSTALL_PREFIX={prefix}', '-DBUILD_TESTING=OFF',
+             f'-DPython3_EXECUTABLE={python}', f'-DPYTHON_EXECUTABLE={python}', **places)
+        _run(tools / 'bin/cmake', '--build', made, '--target', 'install', **places)
     return {'LD_LIBRARY_PATH': str(prefix / 'lib'),
             'PYTHONPATH': str(next(prefix.glob('lib/python3*/site-packages')))}
 
@@ -81,4 +88,4 @@ def _run(*command: object, **variables: str) -> None:
 
 
 if __name__ == '__main__':
-    print(build(Path(sys.argv[1])))
+    print(build(Path(sys.argv[1]), *sys.argv[2:]))

@@ -1,0 +1,92 @@
+"""A doll as a body of REP 155 (draft): its id, its URDF from the mid-hips on, its joints."""
+from __future__ import annotations
+
+import dataclasses
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...files.urdf import to_urdf
+from ...model.pose import Pose
+from ...model.ragdoll import Ragdoll
+from ...model.scene import Scene
+
+JOINTS = frozenset((
+    'waist', 'r_head', 'y_head', 'p_head',
+    *(f'{side}_{name}' for side in 'lr' for name in (
+        'y_shoulder', 'p_shoulder', 'r_shoulder', 'elbow', 'y_hip', 'p_hip', 'r_hip', 'knee'))))
+"""The draft's names of joints: a doll that has them all is a person, as ragdoll_person makes."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A person of a scene; ``root`` and ``angles`` are indices of the scene's bones and angles."""
+
+    id: str
+    root: int
+    angles: np.ndarray
+    joint_names: tuple[str, ...]
+    frame: Pose
+    """The frame body_<id>, in the root bone's: at the mid-hips, x forwards, z up in bind pose."""
+    urdf: str
+
+    @property
+    def frame_name(self) -> str:
+        """body_<id>, the root link of the URDF."""
+        return f'body_{self.id}'
+
+
+def bodies(scene: Scene, most: int) -> list[Body]:
+    """The first persons of a scene, at most so many."""
+    found, ids, first = [], set(), 0
+    for placement in scene.dolls:
+        doll = placement.doll
+        names = [name for joint in doll.joints for name in joint.angle_names]
+        if set(names) >= JOINTS and len(found) < most:
+            body_id = _id(placement.name, ids)
+            ids.add(body_id)
+            hips = _mid_hips(doll)
+            found.append(Body(
+                body_id, scene.bone_index(scene.qualified(placement, doll.root.name)),
+                np.arange(first, first + len(names)), tuple(f'{name}_{body_id}' for name in names),
+                doll.root.pose.relative(hips), _urdf(doll, body_id, hips)))
+        first += len(names)
+    return found
+
+
+def _id(name: str, taken: set[str]) -> str:
+    """The doll's name as part of a topic's name: letters, digits and underscores."""
+    plain = re.sub('[^A-Za-z0-9_]', '_', name)
+    plain = plain if plain[:1].isalpha() else f'b{plain}'
+    return next(each for each in (plain, *(f'{plain}_{count}' for count in range(2, 10 ** 6)))
+                if each not in taken)
+
+
+def _mid_hips(doll: Ragdoll) -> Pose:
+    """The middle of the hips with the doll's axes, in its frame, bind pose."""
+    return Pose(np.mean([joint.anchor for joint in doll.joints
+                         if {'l_p_hip', 'r_p_hip'} & set(joint.angle_names)], axis=0))
+
+
+def _urdf(doll: Ragdoll, body_id: str, hips: Pose) -> str:
+    """The doll's URDF below a link body_<id>, all names with the suffix _<id>."""
+    ending = f'_{body_id}'
+    renamed = doll.renamed(lambda name: name + ending)
+    joints = tuple(
+        dataclasses.replace(joint, names=tuple(name + ending for name in old.angle_names))
+        for joint, old in zip(renamed.joints, doll.joints, strict=True))
+    text = to_urdf(dataclasses.replace(renamed, name=f'body{ending}', joints=joints))
+    # Links between the axes of a joint are the bone's name with /1 and /2, also before the suffix.
+    text = re.sub(rf'{ending}/(\d)"', rf'/\1{ending}"', text)
+    x, y, z = (np.array(doll.root.position) - hips.position).tolist()
+    head, rest = text.split('<robot', 1)
+    opening, rest = rest.split('\n', 1)
+    return f"""{head}<robot{opening}
+  <link name="body{ending}"/>
+  <joint name="root{ending}" type="fixed">
+    <parent link="body{ending}"/>
+    <child link="{doll.root.name}{ending}"/>
+    <origin xyz="{x!r} {y!r} {z!r}"/>
+  </joint>
+{rest}"""

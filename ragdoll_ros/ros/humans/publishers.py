@@ -1,0 +1,116 @@
+"""Publishers below /humans/bodies (REP 155, draft), where hri_msgs is installed."""
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from ...model.scene import Scene
+from ..messages.convert import to_header, to_joint_state
+from ..messages.serialized import SerializedTemplate
+from ..messages.tf import DEPTH, TFMessage, to_tf
+from .body import Body, bodies
+
+if TYPE_CHECKING:
+    from ...physics.simulation import Simulation
+
+try:
+    from hri_msgs.msg import IdsList
+except ImportError as error:  # not on PyPI, which has the rest of ROS
+    IdsList, MISSING = None, str(error)
+
+MAX_BODIES = 50
+"""Largest number of tracked bodies: each has two topics of its own."""
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class BodyPublishers(NamedTuple):
+    """A body with the publishers of its joints and of its URDF."""
+
+    body: Body
+    joints: Publisher
+    urdf: Publisher
+    template: SerializedTemplate
+
+
+class Humans:
+    """Publishes the persons of a scene: ids, joint states, URDFs and, with tf2_msgs, frames."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._bodies: list[BodyPublishers] = []
+        self._tracked: Publisher | None = None
+        self._tf: Publisher | None = None
+        self.status = ''
+        """For /diagnostics: the ids, or why nothing is published; empty without persons."""
+
+    def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
+        """Publish the URDFs of a scene's persons; ``frame`` names the world frame."""
+        self._frame, found = frame, bodies(scene, MAX_BODIES)
+        self._destroy()
+        self.status = ', '.join(body.id for body in found)
+        if found and IdsList is None:
+            self.status = f'not published, as hri_msgs is not installed: {MISSING}'
+            self._node.get_logger().info(f'/humans is {self.status}', once=True)
+        elif found:
+            self._create(found, publish_tf != 'none' and TFMessage is not None)
+
+    @property
+    def has_subscribers(self) -> bool:
+        """Whether somebody listens to what is published with each tick."""
+        return any(publisher.get_subscription_count() for publisher in (
+            *(each.joints for each in self._bodies), *filter(None, (self._tracked, self._tf))))
+
+    def publish(self, simulation: Simulation, stamp: int) -> None:
+        """Publish ids, joints and frames of the current state, where subscribed; stamp in ns."""
+        if not self._bodies:
+            return
+        if self._tracked.get_subscription_count():
+            self._tracked.publish(IdsList(header=to_header(stamp, self._frame),
+                                          ids=[each.body.id for each in self._bodies]))
+        angles = rates = None
+        for each in self._bodies:
+            if each.joints.get_subscription_count():
+                if angles is None:
+                    angles, rates = simulation.joint_angles, simulation.joint_rates
+                each.joints.publish(each.template.serialize(stamp, angles[each.body.angles],
+                                                            rates[each.body.angles]))
+        if self._tf is not None and self._tf.get_subscription_count():
+            found = [each.body for each in self._bodies]
+            edges = [(self._frame, body.frame_name) for body in found]
+            self._tf.publish(to_tf(edges, stamp, body_poses(found, simulation)))
+
+    def _create(self, found: list[Body], with_tf: bool) -> None:
+        create = self._node.create_publisher
+        self._tracked = create(IdsList, '/humans/bodies/tracked', LATCHED)
+        self._tracked.publish(IdsList(header=to_header(0, self._frame),
+                                      ids=[body.id for body in found]))
+        self._tf = create(TFMessage, '/tf', DEPTH) if with_tf else None
+        for body in found:
+            topic, count = f'/humans/bodies/{body.id}', len(body.joint_names)
+            self._bodies.append(BodyPublishers(
+                body, create(JointState, f'{topic}/joint_states', 10),
+                create(String, f'{topic}/urdf', LATCHED),
+                SerializedTemplate.trace(partial(to_joint_state, body.frame_name,
+                                                 body.joint_names), (count,), (count,))))
+            self._bodies[-1].urdf.publish(String(data=body.urdf))
+
+    def _destroy(self) -> None:
+        publishers = [self._tracked, self._tf, *(each.joints for each in self._bodies),
+                      *(each.urdf for each in self._bodies)]
+        for publisher in filter(None, publishers):
+            self._node.destroy_publisher(publisher)
+        self._bodies, self._tracked, self._tf = [], None, None
+
+
+def body_poses(found: list[Body], simulation: Simulation) -> np.ndarray:
+    """Poses (n, 7) of the frames body_<id>, world frame."""
+    frames = [simulation.state.poses(body.root).compose(body.frame) for body in found]
+    return np.array([(*frame.position, *frame.orientation) for frame in frames])
