@@ -17,13 +17,14 @@ from rclpy.parameter import (
     parameter_value_to_python,
 )
 from rclpy.parameter_client import AsyncParameterClient
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model.errors import ModelErrors, RagdollError
 from ragdoll_ros.physics.accuracy import EXACT
+from ragdoll_ros.ros.latched_topic import InvalidQosOverride
 from ragdoll_ros.ros.node import RagdollNode
 from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters.node_settings import SPECS, NodeSettings
@@ -332,3 +333,19 @@ def test_a_broken_scene_ends_the_start_with_all_its_faults(make_node, broken_sce
 def test_the_defaults_are_those_of_the_default_scene(node):
     assert dataclasses.replace(NodeSettings(), pushed_bone='torso') == node.settings
     assert node.describe_parameter('rate').type == ParameterType.PARAMETER_DOUBLE
+
+
+def test_qos_overrides_set_the_qos_of_publishers(make_node):
+    """Of this topic alone, also after it has been made anew for want of subscribers."""
+    name = 'qos_overrides./ragdoll/poses.publisher.'
+    node = make_node(**{f'{name}reliability': 'best_effort', f'{name}depth': 3})
+    for _ in range(2):
+        for topic, expected in (('poses', ReliabilityPolicy.BEST_EFFORT),
+                                ('markers', ReliabilityPolicy.RELIABLE)):
+            found, = node.get_publishers_info_by_topic(f'/ragdoll/{topic}')
+            assert found.qos_profile.reliability == expected
+        node.pause(True)
+        node.tick()
+    assert node.get_parameter(f'{name}depth').value == 3
+    with pytest.raises(InvalidQosOverride, match='~/poses: Unexpected QoS override'):
+        make_node(**{f'{name}reliability': 'fast'})

@@ -1,17 +1,40 @@
-"""A topic whose late subscribers get the last messages, as far as they are of the present."""
+"""Topics that are published with each tick: QoS overrides, and what late subscribers get."""
 from __future__ import annotations
+
+import copy
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from ..model.errors import RagdollError
 
 LATCHED_HISTORY = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """For topics that are silent while paused: late subscribers get the last messages. Fewer could be
 lost on their way, as a message that is not yet acknowledged makes room for a new one."""
 
 
+class InvalidQosOverride(RagdollError):
+    """A parameter qos_overrides.* with a value that no policy has."""
+
+
+def overridable_publisher(node: Node, kind: type, name: str, qos: QoSProfile | int) -> Publisher:
+    """A publisher whose history, depth and reliability users set by qos_overrides parameters.
+
+    Raises InvalidQosOverride.
+    """
+    try:
+        # rclpy writes the overrides into the profile that it is given.
+        return node.create_publisher(
+            kind, name, copy.copy(qos),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+    except RuntimeError as error:
+        raise InvalidQosOverride(f'{name}: {error}') from None
+
+
 class LatchedTopic:
-    """Publishes ``kind`` on ``name`` while there are subscribers.
+    """Publishes ``kind`` on ``name`` while there are subscribers; late ones get the last messages.
 
     What was published before they left would be old for the next one: it is forgotten.
     """
@@ -44,4 +67,4 @@ class LatchedTopic:
         self._node.destroy_publisher(self._publisher)
 
     def _made(self) -> Publisher:
-        return self._node.create_publisher(self._kind, self._name, LATCHED_HISTORY)
+        return overridable_publisher(self._node, self._kind, self._name, LATCHED_HISTORY)

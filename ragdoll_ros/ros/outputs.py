@@ -18,7 +18,7 @@ from visualization_msgs.msg import MarkerArray
 from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
 from .humans.publishers import Humans
-from .latched_topic import LATCHED_HISTORY, LatchedTopic
+from .latched_topic import LATCHED_HISTORY, LatchedTopic, overridable_publisher
 from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
 from .messages.measures import TickMeasures, checksum, serialize_measures
 from .messages.serialized import serialize_pose_array
@@ -40,13 +40,13 @@ class Outputs:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._poses = LatchedTopic(node, PoseArray, '~/poses')
-        self._state = node.create_publisher(MultiDOFJointState, '~/state', 10)
-        self._joints = node.create_publisher(JointState, 'joint_states', 10)
+        self._state = overridable_publisher(node, MultiDOFJointState, '~/state', 10)
+        self._joints = overridable_publisher(node, JointState, 'joint_states', 10)
         self._measures = LatchedTopic(node, DiagnosticArray, '~/measures')
         self._run: tuple[Simulation | None, int, int] = (None, 0, 0)
         """The simulation that was published last, its reset_count, and the number of that run."""
         self._swings: LatchedTopic | None = None
-        self._contacts = node.create_publisher(PoseArray, '~/contacts', 10)
+        self._contacts = overridable_publisher(node, PoseArray, '~/contacts', 10)
         self._markers = LatchedTopic(node, MarkerArray, '~/markers')
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._tf = TfPublisher(node)
