@@ -4,6 +4,7 @@ ros2 launch ragdoll_ros ragdoll.launch.py scene:=crowd pace:=0.5 rviz:=true
 """
 from __future__ import annotations
 
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -12,11 +13,16 @@ from launch import LaunchContext, LaunchDescription
 from ragdoll_ros.files.config import config_folder
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.files.urdf import scene_to_urdf
+from ragdoll_ros.ros.parameters.launch_arguments import BOOLEANS, node_parameters
 
 ARGUMENTS = {
-    'scene': ('drop', 'a name in config/, or the path of a scene or a doll'),
+    'scene': ('', 'a name in config/, or the path of a scene or a doll; empty: drop'),
+    'params_file': ('', 'parameter file of the node; other arguments override it'),
     'namespace': ('', 'namespace of the nodes, their topics and tf'),
     'pace': ('', "real-time factor; empty: the scene's"),
+    'rate': ('', "ticks per second of simulated time, Hz; empty: the scene's"),
+    'publish_clock': ('', 'true: publish simulated time on /clock'),
+    'use_sim_time': ('', 'true: take time from /clock'),
     'robot_state_publisher': ('false', 'true: it publishes the frames below the root links'),
     'rviz': ('false', 'true: start RViz')}
 """Default and description of each argument."""
@@ -37,26 +43,24 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def make_nodes(context: LaunchContext) -> list[Node]:
-    """The nodes that the launch arguments request."""
+    """The nodes that the launch arguments request; all are checked before one starts."""
     given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    parameters = node_parameters(given, is_installed)
     namespace = given['namespace']
-    nodes = [ragdoll_node(given, namespace)]
-    if is_true(given['robot_state_publisher']):
-        nodes.append(robot_state_publisher(given['scene'], namespace))
-    if is_true(given['rviz']):
+    nodes = [ragdoll_node(given, parameters)]
+    if BOOLEANS[given['robot_state_publisher'].lower()]:
+        nodes.append(robot_state_publisher(given['scene'] or 'drop', namespace))
+    if BOOLEANS[given['rviz'].lower()]:
         nodes.append(rviz(namespace))
     return nodes
 
 
-def ragdoll_node(given: dict[str, str], namespace: str) -> Node:
+def ragdoll_node(given: dict[str, str], parameters: dict) -> Node:
     """The ragdoll node; with robot_state_publisher it publishes only the root links on tf."""
-    parameters = {'scene': given['scene']}
-    if is_true(given['robot_state_publisher']):
-        parameters['publish_tf'] = 'root'
-    if given['pace']:
-        parameters['real_time_factor'] = float(given['pace'])
-    return Node(package='ragdoll_ros', executable='ragdoll_node', namespace=namespace,
-                parameters=[parameters], remappings=TF_REMAPPINGS, output='screen')
+    files = [given['params_file']] if given['params_file'] else []
+    return Node(package='ragdoll_ros', executable='ragdoll_node', namespace=given['namespace'],
+                parameters=[*files, parameters] if parameters else files,
+                remappings=TF_REMAPPINGS, output='screen')
 
 
 def robot_state_publisher(scene: str, namespace: str) -> Node:
@@ -75,6 +79,10 @@ def rviz(namespace: str) -> Node:
                 remappings=[*TF_REMAPPINGS, *topics, ('/robot_description', 'robot_description')])
 
 
-def is_true(text: str) -> bool:
-    """Whether a launch argument is true."""
-    return text.lower() in ('true', '1')
+def is_installed(package: str) -> bool:
+    """Whether ROS finds a package."""
+    try:
+        get_package_prefix(package)
+    except PackageNotFoundError:
+        return False
+    return True

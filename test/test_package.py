@@ -39,8 +39,8 @@ OPTIONAL_IN_ROS = {'hri_msgs'}
 """Taken where the user's ROS has it; pip does not."""
 NUMBAS = {'llvmlite'}
 """What numba is made of: who has numba has it."""
-LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}
-"""What the files in launch/ are read by."""
+LAUNCHED = {'ament_index_python', 'launch', 'launch_ros', 'launch_xml'}
+"""What the files in launch/ are read by and import."""
 CLUSTER = {'ray'}
 """Wanted where there are several machines, by an extra of its name."""
 PEERS = {'dartpy', 'pydrake'}

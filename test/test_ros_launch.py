@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import ast
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -12,6 +11,12 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
+
+from ragdoll_ros.ros.parameters.launch_arguments import (
+    PARAMETERS,
+    InvalidLaunchArguments,
+    node_parameters,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = ('ragdoll.launch.py', 'ragdoll.launch.xml')
@@ -54,9 +59,49 @@ def test_what_the_launch_file_starts_and_sets_is_there(make_node):
     text = PYTHON.read_text()
     assert "package='ragdoll_ros', executable='ragdoll_node'" in text
     assert "'ragdoll_node': 'ragdoll_ros.ros.node:main'" in (ROOT / 'setup.py').read_text()
-    named = set(re.findall(r"parameters(?:\[| = \{)'(\w+)'", text)) - {'robot_description'}
-    assert named == {'scene', 'publish_tf', 'real_time_factor'}
-    assert all(make_node().has_parameter(name) for name in named)
+    assert node_parameters(given(), lambda package: False) == {}
+    node = make_node()
+    assert all(node.has_parameter(name) for name in {*PARAMETERS.values(), 'publish_tf'})
+
+
+def given(**values):
+    """All launch arguments, with these values."""
+    return {**{name: default for name, (default, _) in constant('ARGUMENTS').items()}, **values}
+
+
+def test_arguments_become_parameters_of_the_node(tmp_path):
+    path = tmp_path / 'mine.yaml'
+    path.write_text('/**: {ros__parameters: {scene: crowd}}')
+    found = node_parameters(given(scene='flight', pace='0.5', rate='50', publish_clock='true',
+                                  use_sim_time='False', robot_state_publisher='1',
+                                  params_file=str(path)), lambda package: True)
+    assert found == {'scene': 'flight', 'real_time_factor': 0.5, 'rate': 50.0, 'publish_tf': 'root',
+                     'publish_clock': True, 'use_sim_time': False}
+
+
+@pytest.mark.parametrize(('wrong', 'told'), [
+    ({'rate': 'fast'}, 'rate:=fast: expected a number from 5 to 5000'),
+    ({'rate': '2'}, 'rate:=2: expected a number from 5 to 5000'),
+    ({'pace': 'nan'}, 'pace:=nan: expected a number from 0.001 to 100'),
+    ({'publish_clock': 'ja'}, 'publish_clock:=ja: expected true or false'),
+    ({'use_sim_time': '2'}, 'use_sim_time:=2: expected true or false'),
+    ({'rviz': ''}, 'rviz:=: expected true or false'),
+    ({'params_file': '/nowhere.yaml'}, 'params_file:=/nowhere.yaml: expected a parameter file'),
+    ({'params_file': __file__, 'robot_state_publisher': 'true'},
+     'robot_state_publisher:=true with a params_file needs scene:=... as well'),
+    ({'rviz': 'true'}, 'rviz:=true needs rviz2, which is not installed: sudo apt install '
+                       'ros-$ROS_DISTRO-rviz2')])
+def test_what_is_wrong_or_missing_is_told_before_anything_starts(wrong, told):
+    with pytest.raises(InvalidLaunchArguments) as caught:
+        node_parameters(given(**wrong), lambda package: package == 'robot_state_publisher')
+    assert str(caught.value) == told
+
+
+def test_all_faults_are_told_at_once():
+    with pytest.raises(InvalidLaunchArguments) as caught:
+        node_parameters(given(rate='x', pace='y', rviz='z'), lambda package: True)
+    assert [line.split(':')[0] for line in str(caught.value).splitlines()] == [
+        'pace', 'rate', 'rviz']
 
 
 def test_all_topics_of_the_configuration_of_rviz_go_into_the_namespace(make_node):
