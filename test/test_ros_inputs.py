@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import pytest
 from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
@@ -187,3 +188,14 @@ def test_warnings_come_once_a_second_at_the_most(node, inputs, capfd):
         inputs.on_force(wrench((math.nan, 0, 0)))
     assert node.input_counts.refused == {'~/force': 200}
     assert 1 <= capfd.readouterr().err.count('~/force refused') <= 2
+
+
+def test_how_old_the_last_refusal_is_grows_until_the_next(node, inputs):
+    before = time.monotonic()
+    assert math.isnan(node.input_counts.last_reason_age)
+    inputs.on_force(wrench((math.nan, 0, 0)))
+    first = node.input_counts.last_reason_age
+    second = node.input_counts.last_reason_age
+    assert 0 <= first < second <= time.monotonic() - before
+    inputs.on_force(wrench((math.nan, 0, 0)))
+    assert node.input_counts.last_reason_age < time.monotonic() - before - first

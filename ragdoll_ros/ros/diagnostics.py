@@ -130,6 +130,7 @@ class Diagnostics:
             'refused': counts.refused.total(),
             'clamped': counts.clamped.total(),
             'last_reason': counts.last_reason,
+            'last_reason_age': counts.last_reason_age,
             **{f'refused {source}': count for source, count in counts.refused.items()},
             **{f'clamped {source}': count for source, count in counts.clamped.items()}}
 

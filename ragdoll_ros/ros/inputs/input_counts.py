@@ -1,6 +1,8 @@
 """Counters of refused and clamped input."""
 from __future__ import annotations
 
+import math
+import time
 from collections import Counter
 
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -17,7 +19,13 @@ class InputCounts:
         self.clamped: Counter[str] = Counter()
         self.last_reason = ''
         """Why the last input was refused or clamped."""
+        self._last_time = math.nan
         self._logger = logger
+
+    @property
+    def last_reason_age(self) -> float:
+        """Wall time since the last input was refused or clamped, s; NaN if none was."""
+        return time.monotonic() - self._last_time
 
     def refuse(self, source: str, reason: object) -> None:
         """Count an input that was ignored."""
@@ -30,5 +38,5 @@ class InputCounts:
         self._warn(f'{source} clamped: {reason}')
 
     def _warn(self, text: str) -> None:
-        self.last_reason = text
+        self.last_reason, self._last_time = text, time.monotonic()
         self._logger.warning(text, throttle_duration_sec=WARNING_PERIOD)
