@@ -349,3 +349,27 @@ def test_qos_overrides_set_the_qos_of_publishers(make_node):
     assert node.get_parameter(f'{name}depth').value == 3
     with pytest.raises(InvalidQosOverride, match='~/poses: Unexpected QoS override'):
         make_node(**{f'{name}reliability': 'fast'})
+
+
+def test_a_broken_scene_does_not_hide_other_faults(make_node, broken_scene):
+    path, words = broken_scene
+    with pytest.raises(RagdollError) as caught:
+        make_node(scene=str(path), rate=-1.0, pushed_bone='tail')
+    assert all(word in str(caught.value) for word in (*words, 'rate'))
+    assert 'pushed_bone' not in str(caught.value), 'of a scene that is not known'
+
+
+def test_all_wrong_words_are_told_at_once(make_node):
+    with pytest.raises(RagdollError) as caught:
+        make_node(accuracy='fine', publish_tf='some', engine='steam', frame_id='/map',
+                  pushed_bone='tail', imus=['nose'], max_force=-1.0)
+    told = str(caught.value)
+    assert all(name in told for name in ('accuracy', 'publish_tf', 'engine', 'frame_id',
+                                         'pushed_bone', 'imus', 'max_force'))
+
+
+def test_the_line_at_the_start_follows_remappings(ros, capfd):
+    node = RagdollNode(cli_args=['--ros-args', '-r', '~/poses:=/bodies', '-r',
+                                 '/diagnostics:=/health'])
+    node.destroy_node()
+    assert 'poses on /bodies, status on /health' in capfd.readouterr().err

@@ -19,7 +19,8 @@ def start_line(simulation: Simulation, settings: NodeSettings, node: Node) -> st
             f'{counted(len(scene.bones), "bone")}, engine {simulation.engine_name}'
             + (f' (as {reason})' if reason else '')
             + f', accuracy {settings.accuracy}; poses on '
-            f'{node.get_fully_qualified_name()}/poses, status on /diagnostics')
+            f'{node.resolve_topic_name("~/poses")}, '
+            f'status on {node.resolve_topic_name("/diagnostics")}')
 
 
 def end_line(simulation: Simulation, refused: int, dropped: int) -> str:

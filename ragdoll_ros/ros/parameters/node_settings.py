@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 
 from ...model import errors
@@ -124,26 +124,50 @@ def scene_defaults(scene: Scene) -> dict:
             if spec.metadata['scene_default']}
 
 
+class InvalidSettings(errors.RagdollError):
+    """Several values that are not valid."""
+
+
 def check(settings: NodeSettings, scene: Scene) -> None:
-    """Raise a RagdollError for values that a descriptor's range cannot exclude."""
-    if settings.accuracy not in ACCURACIES:
-        raise errors.OutOfRange('accuracy', settings.accuracy, 'one of ' + ', '.join(ACCURACIES))
-    if settings.publish_tf not in PUBLISH_TF:
-        raise errors.OutOfRange('publish_tf', settings.publish_tf,
-                                'one of ' + ', '.join(PUBLISH_TF))
-    check_engine(settings.engine)
-    names = scene.bone_names
+    """Raise a RagdollError with all values that a descriptor's range cannot exclude."""
+    found = [*_wrong_words(settings), *_wrong_names(settings, scene), *_wrong_sensors(settings,
+                                                                                   scene)]
+    if len(found) == 1:
+        raise found[0]
+    if found:
+        raise InvalidSettings('\n'.join(map(str, found)))
+
+
+def _wrong_words(settings: NodeSettings) -> Iterator[errors.RagdollError]:
+    for name, words in (('accuracy', ACCURACIES), ('publish_tf', PUBLISH_TF)):
+        if getattr(settings, name) not in words:
+            yield errors.OutOfRange(name, getattr(settings, name), 'one of ' + ', '.join(words))
+    yield from _raised(lambda: check_engine(settings.engine))
+
+
+def _wrong_names(settings: NodeSettings, scene: Scene) -> Iterator[errors.RagdollError]:
+    names, frame = scene.bone_names, settings.frame_id
     if settings.pushed_bone not in names:
-        raise errors.UnknownBone('pushed_bone', settings.pushed_bone,
+        yield errors.UnknownBone('pushed_bone', settings.pushed_bone,
                                  errors.one_of(names, settings.pushed_bone))
-    frame = settings.frame_id
     if not frame or frame.startswith('/'):
-        raise errors.OutOfRange('frame_id', frame, 'a name without a leading slash')
+        yield errors.OutOfRange('frame_id', frame, 'a name without a leading slash')
     if frame in names:
-        raise errors.DuplicateName('frame_id', frame, 'a name that is no bone')
-    settings.imu_flaws  # noqa: B018 - raises for invalid values
-    check_imus(settings.imus, names)
+        yield errors.DuplicateName('frame_id', frame, 'a name that is no bone')
+
+
+def _wrong_sensors(settings: NodeSettings, scene: Scene) -> Iterator[errors.RagdollError]:
+    yield from _raised(lambda: settings.imu_flaws)
+    yield from _raised(lambda: check_imus(settings.imus, scene.bone_names))
     samples = settings.imu_rate / settings.rate
     if any(settings.imus) and (samples < 1 - 1e-9 or abs(samples / round(samples) - 1) > 1e-9):
-        raise errors.OutOfRange('imu_rate', settings.imu_rate,
+        yield errors.OutOfRange('imu_rate', settings.imu_rate,
                                 f'a multiple of rate, {settings.rate:g}')
+
+
+def _raised(checked: Callable[[], object]) -> Iterator[errors.RagdollError]:
+    """The error that a check raises, if it raises one."""
+    try:
+        checked()
+    except errors.RagdollError as error:
+        yield error

@@ -51,7 +51,7 @@ class Parameters:
         overrides.update((given.name, given) for given in as_doubles(overrides.values()))
         found: list[str] = []
         self._declare('scene', found)
-        self.scene = load_scene(self.settings.scene)
+        broken = self._load_scene()
         for name, default in scene_defaults(self.scene).items():
             self.settings = dataclasses.replace(self.settings, **{name: default})
         for name in SPECS:
@@ -60,9 +60,12 @@ class Parameters:
         try:
             check(self.settings, self.scene)
         except RagdollError as error:
-            found.append(str(error))
+            if not broken:
+                found.append(str(error))
+        if broken and not found:
+            raise broken
         if found:
-            raise InvalidParameters('\n'.join(found))
+            raise InvalidParameters('\n'.join([*map(str, filter(None, [broken])), *found]))
         # An override, as in a dump of another scene's parameters, would be wrong.
         node.declare_parameter(BONE_NAMES, list(self.scene.bone_names), ParameterDescriptor(
             description='Names of all bones, in the order of ~/poses', read_only=True),
@@ -84,6 +87,17 @@ class Parameters:
         node, name = self._node, parameter.name
         return (node.has_parameter(name) and node.describe_parameter(name).read_only
                 and node.get_parameter(name).value == parameter.value)
+
+    def _load_scene(self) -> RagdollError | None:
+        """Load the scene; if it is broken, give the error, and go on with the default one, so that
+        the faults of other parameters are told as well.
+        """
+        try:
+            self.scene = load_scene(self.settings.scene)
+        except RagdollError as error:
+            self.scene = load_scene(NodeSettings.scene)
+            return error
+        return None
 
     def _declare(self, name: str, found: list[str]) -> None:
         """Declare a parameter and store its value; an error is appended to ``found``."""
