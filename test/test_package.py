@@ -394,3 +394,13 @@ def test_colcon_build_runs_the_node(ros, environment, tmp_path, option):
     sourced = f'. {tmp_path}/install/setup.sh && exec {prefix}/lib/ragdoll_ros/ragdoll_node "$@"'
     assert poses_published_by(environment / 'bin/python', 'sh', '-c', sourced, 'sh', '--ros-args',
                               '-p', 'scene:=crowd') == 100
+
+
+def test_the_workflow_runs_what_must_hold():
+    workflow = yaml.safe_load((ROOT / '.github/workflows/ci.yml').read_text())
+    steps = workflow['jobs']['test']['steps']
+    commands = [step['run'] for step in steps if 'run' in step]
+    assert commands == ['.ci/run']
+    assert os.access(ROOT / commands[0], os.X_OK)
+    version = next(step['with']['python-version'] for step in steps if 'with' in step)
+    assert tuple(map(int, version.split('.'))) >= (3, 10)
