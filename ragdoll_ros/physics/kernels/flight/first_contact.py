@@ -21,6 +21,9 @@ from .dense_step import ACCELERATION_FACTOR, acceleration_bounds, evaluate_dense
 CLOSED = 1e-11
 """m or rad: the gap that is left at the time of a contact."""
 
+DEEPEST_START = -10 * TOUCHING
+"""m or rad: least gap with which a flight may begin; deeper ones are corrected by contact steps."""
+
 MAX_SAMPLES = 400
 """Instants of one step at which gaps are computed."""
 
@@ -158,11 +161,12 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
 def set_contact_gaps(ws: Workspace) -> None:
     """Write flight.contact_gaps, m or rad, at which gaps count as contacts: 0; those that touch now
     must first penetrate by 2 TOUCHING, and by TOUCHING more than now: else what penetrates already
-    would be a contact at once, and again after each impact.
+    would be a contact at once, and again after each impact. Never below DEEPEST_START: what
+    penetrates farther does not fly.
     """
     for j in range(len(ws.gaps)):
-        ws.flight.contact_gaps[j] = (
-            0.0 if ws.gaps[j] > TOUCHING else min(ws.gaps[j] + TOUCHING, 0.0) - 2 * TOUCHING)
+        ws.flight.contact_gaps[j] = 0.0 if ws.gaps[j] > TOUCHING else max(
+            min(ws.gaps[j] + TOUCHING, 0.0) - 2 * TOUCHING, DEEPEST_START)
 
 
 @compiled
