@@ -21,6 +21,7 @@ from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Shape
+from .surface import check_surface
 from .swing import Swing
 from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
 
@@ -74,14 +75,7 @@ class Bone:
         if self.name == WORLD:
             raise errors.DuplicateName('name', self.name, "a name other than the world frame's")
         errors.check_positive('mass', self.mass)
-        for key, most in (('friction', math.inf), ('rolling_friction', math.inf),
-                          ('restitution', 1)):
-            if getattr(self, key) is not None:
-                errors.check_range(key, getattr(self, key), 0, most)
-        if self.color is not None:
-            set_fields(self, color=finite_floats('color', self.color, 4))
-            for part in self.color:
-                errors.check_range('color', part, 0, 1)
+        check_surface(self, max_rolling_friction=math.inf)
         if self.moments is not None:
             moments = vector(finite_floats('inertia', self.moments))
             set_fields(self, moments=_checked_moments(moments))

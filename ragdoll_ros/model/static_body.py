@@ -9,6 +9,7 @@ from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Part, Shape, Solid
+from .surface import check_surface
 from .vectors import Quaternion, Vector, finite_floats, unit_vector
 
 DEFAULT_COLOR = (0.76, 0.78, 0.81, 1.0)
@@ -52,13 +53,7 @@ class StaticBody:
                                            'a quaternion x, y, z, w, not zero', 4))
         if not isinstance(self.shape, Solid | Compound):
             raise errors.WrongForm('shape', self.shape, 'a shape, or a Compound of shapes')
-        for key, most in (('friction', np.inf), ('rolling_friction', 1e6), ('restitution', 1)):
-            if getattr(self, key) is not None:
-                errors.check_range(key, getattr(self, key), 0, most)
-        if self.color is not None:
-            set_fields(self, color=finite_floats('color', self.color, 4))
-            for part in self.color:
-                errors.check_range('color', part, 0, 1)
+        check_surface(self, max_rolling_friction=1e6)
 
     @property
     def pose(self) -> Pose:

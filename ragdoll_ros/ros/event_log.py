@@ -23,7 +23,7 @@ from std_msgs.msg import String
 
 from ..files.run_scene import run_scene_text, scene_digest
 from ..physics.logged_simulation import LoggedSimulation, state_digest
-from .outputs import LATCHED
+from .latched_topic import LATCHED
 
 HASH_INTERVAL = 100
 """Ticks between two SHA-256 of the state."""

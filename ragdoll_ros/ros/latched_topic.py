@@ -10,6 +10,9 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from ..model.errors import RagdollError
 
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For topics whose last message is all that late subscribers need."""
+
 LATCHED_HISTORY = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """For topics that are silent while paused: late subscribers get the last messages. Fewer could be
 lost on their way, as a message that is not yet acknowledged makes room for a new one."""

@@ -9,7 +9,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import String
@@ -18,7 +17,7 @@ from visualization_msgs.msg import MarkerArray
 from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
 from .humans.publishers import Humans
-from .latched_topic import LATCHED_HISTORY, LatchedTopic, overridable_publisher
+from .latched_topic import LATCHED, LATCHED_HISTORY, LatchedTopic, overridable_publisher
 from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
 from .messages.measures import TickMeasures, checksum, serialize_measures
 from .messages.serialized import serialize_pose_array
@@ -30,8 +29,6 @@ if TYPE_CHECKING:  # else the page, which imports this file, would load an engin
 
 MARKER_PERIOD = 33_000_000
 """ns of the steady clock between two MarkerArrays: 30 Hz, enough for a screen."""
-
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Outputs:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from ...model.scene import Scene
+from ..latched_topic import LATCHED
 from ..messages.convert import to_header, to_joint_state
 from ..messages.serialized import SerializedTemplate
 from ..messages.tf import DEPTH, TFMessage, to_tf
@@ -27,8 +27,6 @@ except ImportError as error:  # not on PyPI, which has the rest of ROS
 
 MAX_BODIES = 50
 """Largest number of tracked bodies: each has two topics of its own."""
-
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class BodyPublishers(NamedTuple):

@@ -11,7 +11,7 @@ from std_msgs.msg import String
 
 from ...files.urdf_tree import parse_urdf
 from ...model.errors import RagdollError
-from ..outputs import LATCHED
+from ..latched_topic import LATCHED
 
 
 class DollMotion:

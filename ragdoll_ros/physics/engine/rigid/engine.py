@@ -224,11 +224,11 @@ class RigidEngine:
         """
         clusters = self._clusters
         pairs = self._pairs_to_form(duration) if len(self.scene.dolls) > 1 else None
-        moved = clusters.static_geoms.update(clusters.bone_states, duration, ~self.sleeping)
+        found_others = clusters.static_geoms.update(clusters.bone_states, duration, ~self.sleeping)
         if pairs is not None:
             clusters.form(pairs)
             self._age = 0
-        elif moved:
+        elif found_others:
             clusters.form(clusters.pairs)
 
     def _pairs_to_form(self, duration: float) -> np.ndarray | None:

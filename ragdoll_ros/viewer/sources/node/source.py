@@ -28,7 +28,7 @@ from ....model.scene import Scene
 from ....model.vectors import Vector
 from ....ros.diagnostics import status_name
 from ....ros.inputs.subscriptions import PushSubscriptions
-from ....ros.outputs import LATCHED
+from ....ros.latched_topic import LATCHED
 from ..source import Frame, RequestedData, Source, SourceStatus
 from .frames import NodeFrames
 from .hands import NodeHands
