@@ -24,9 +24,8 @@ from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model.errors import ModelErrors, RagdollError
 from ragdoll_ros.physics.accuracy import EXACT
-from ragdoll_ros.ros.latched_topic import InvalidQosOverride
+from ragdoll_ros.ros.latched_topic import LATCHED, InvalidQosOverride
 from ragdoll_ros.ros.node import RagdollNode
-from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters.node_settings import SPECS, NodeSettings
 
 LATCHED_LOG = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
