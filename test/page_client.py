@@ -32,11 +32,11 @@ class PageClient:
         assert self._ready.wait(PATIENCE)
         self.look(position, look_at)
 
-    def look(self, position, look_at=(0.0, 0.0, 0.8)):
-        """Tell where the camera is and what it looks at."""
+    def look(self, position, look_at=(0.0, 0.0, 0.8), size=(1100, 700)):
+        """Tell where the camera is, what it looks at, and the canvas' width and height, pixels."""
         self.send(_messages.ViewerCameraMessage(
             wxyz=(1, 0, 0, 0), position=position, fov=0.8, near=0.01, far=1000.0,
-            image_height=700, image_width=1100, look_at=look_at, up_direction=(0, 0, 1)))
+            image_height=size[1], image_width=size[0], look_at=look_at, up_direction=(0, 0, 1)))
 
     def send(self, message):
         """Send one message as a browser would."""

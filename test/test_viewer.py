@@ -18,7 +18,7 @@ from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Capsule, Sphere
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Recording
-from ragdoll_ros.viewer.drawing.framing import bounding_spheres, home_position
+from ragdoll_ros.viewer.drawing.framing import bounding_spheres, box_center, home_position
 from ragdoll_ros.viewer.drawing.overlays import WEIGHT_LENGTH
 from ragdoll_ros.viewer.sources.playback import PlaybackSource
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
@@ -527,6 +527,23 @@ def test_another_scene_is_framed_while_the_camera_follows(page):
     home = home_position(*bounding_spheres(scene, page.frame.state), centre, camera.fov,
                  camera.image_width / camera.image_height)
     assert np.linalg.norm(camera.position - home) < 0.01 * np.linalg.norm(home - centre)
+
+
+def test_a_home_view_of_another_size_is_replaced(page):
+    """Also where it came last: the page told of its new size while the old view was computed."""
+    client = page.open()
+    wait(lambda: page.frame)
+    frame = paused(page)
+    camera, = (each.camera for each in page.server.get_clients().values())
+    spheres = bounding_spheres(frame.scene, frame.state)
+    look_at = tuple(map(float, box_center(*spheres)))
+    wide, tall = (1100, 700), (390, 844)
+    start = page.server.initial_camera.position
+    home = {size: home_position(*spheres, look_at, camera.fov, size[0] / size[1])
+            for size in (wide, tall)}
+    for position, size in ((start, wide), (home[wide], tall), (home[wide], tall)):
+        client.look(tuple(map(float, position)), look_at, size)
+        wait(lambda size=size: np.abs(camera.position - home[size]).max() < 1e-3, timeout=20)
 
 
 def test_plots_tell_energy_gap_and_real_time_factor(page):

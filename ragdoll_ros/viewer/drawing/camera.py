@@ -55,10 +55,9 @@ class Cameras:
         self._doll = server.scene.add_frame(DOLL_NODE, show_axes=False)
         self._bone = 0
         """Index of the pushed bone."""
-        self._homes: dict[int, deque[np.ndarray]] = {}
-        """Positions of each page's last home views: a page tells of its place before the last."""
-        self._home_aspects: dict[int, float] = {}
-        """That the last one was computed for."""
+        self._homes: dict[int, deque[tuple[np.ndarray, float]]] = {}
+        """Each page's last home views, position and the aspect that it was computed for: a page
+        may still tell of its place before the last."""
         self._before_follow: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         """Position and target of each page's camera before it followed."""
         self._next_move = 0.0
@@ -92,9 +91,10 @@ class Cameras:
         look_at = box_center(*spheres)
         if self._node is not None:  # its position may be of the scene before
             self._node.position = look_at = self._center(self._frame)
-        position = home_position(*spheres, look_at, camera.fov, _aspect(camera))
-        self._homes.setdefault(client.client_id, deque(maxlen=MOST_HOMES)).append(position)
-        self._home_aspects[client.client_id] = _aspect(camera)
+        aspect = _aspect(camera)  # once: the page may tell of another size at any time
+        position = home_position(*spheres, look_at, camera.fov, aspect)
+        homes = self._homes.setdefault(client.client_id, deque(maxlen=MOST_HOMES))
+        homes.append((position, aspect))
         camera.up_direction = (0.0, 0.0, 1.0)
         self._move(client, position, look_at)
         camera.far = max(FAR, 3 * float(np.linalg.norm(position - look_at)))
@@ -128,16 +128,20 @@ class Cameras:
 
         Viser may apply its initial camera after that.
         """
-        self.go_home(client)
-
         @client.camera.on_update
         def _(camera: viser.CameraHandle) -> None:
-            homes = self._homes.get(client.client_id, ())
-            aspect = self._home_aspects.get(client.client_id, 1.0)
-            resized = abs(_aspect(camera) / aspect - 1) > 0.01
             if _is_at(camera, self._server.initial_camera.position) or (
-                    resized and any(_is_at(camera, position) for position in homes)):
+                    self._is_at_home_of_another_size(client)):
                 self.go_home(client)
+
+        self.go_home(client)
+
+    def _is_at_home_of_another_size(self, client: viser.ClientHandle) -> bool:
+        """Whether a page is at a home view, but at none that was computed for its aspect."""
+        now = _aspect(client.camera)
+        aspects = [aspect for position, aspect in tuple(self._homes.get(client.client_id, ()))
+                   if _is_at(client.camera, position)]
+        return bool(aspects) and all(abs(now / aspect - 1) > 0.01 for aspect in aspects)
 
     def _ensure_visible(self, client: viser.ClientHandle) -> None:
         """Show the home view where a camera does not see all or is too far away."""
