@@ -6,6 +6,7 @@ import os
 import random
 import signal
 import subprocess
+import sys
 import time
 from contextlib import suppress
 
@@ -55,6 +56,17 @@ def test_a_signal_at_the_start_ends_it_with_0(ros, sign, delay):
     process.send_signal(sign)
     code, output, errors = outcome(process)
     assert (code, output) == (0, '') and 'Traceback' not in errors
+
+
+def test_a_signal_during_an_exec_ends_it_with_0(tmp_path):
+    """Dataclasses are made by one. Python would die by the signal at its exit, though caught."""
+    (tmp_path / 'interrupted.py').write_text(
+        'import signal, sys\n'
+        'from ragdoll_ros.ros.process.signals import run_until_signal\n'
+        'sys.exit(run_until_signal(lambda: exec("signal.raise_signal(signal.SIGINT)")))\n')
+    found = dict(os.environ, PYTHONPATH=os.pathsep.join([str(tmp_path), *sys.path]))
+    run = subprocess.run([sys.executable, '-m', 'interrupted'], env=found, timeout=PATIENCE)
+    assert run.returncode == 0
 
 
 def test_more_signals_while_it_ends_change_nothing(ros, peer):

@@ -62,3 +62,6 @@ def run_until_signal(run: Callable[[], int]) -> int:
     finally:
         for number in SHUTDOWN_SIGNALS:
             signal.signal(number, signal.SIG_IGN)
+        # After a KeyboardInterrupt in an exec or eval of a string, as in a dataclass, a module that
+        # was run by -m would die by SIGINT at its exit, though it was caught. An eval clears that.
+        eval('0')
