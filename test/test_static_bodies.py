@@ -83,6 +83,46 @@ def test_a_box_as_a_floor_is_a_ground(shape, start, angle, restitution, accuracy
 
 
 @pytest.mark.parametrize('accuracy', ACCURACIES)
+@pytest.mark.parametrize('angle', [0.0, 0.6])
+@pytest.mark.parametrize('shape, tolerance', [(Sphere(0.1), 1e-6), (Box((0.2, 0.2, 0.2)), 1e-5)])
+def test_tiles_of_equal_height_are_one_floor(shape, tolerance, angle, accuracy):
+    """What rolls or slides at 3 m/s over ten of their edges does not feel them. A box is within the
+    bound of its step, since more points than on a plane share its weight.
+    """
+    start = loose(shape, position=(0, 0.05, 0.1), velocity=(3, 0, 0))
+    turned = [inclined(start, StaticBody(f'tile_{k}', Box((0.3, 4.0, 1.0)),
+                                         position=(0.3 * k - 0.6, 0.0, -0.5)), angle)
+              for k in range(40)]
+    placement, _, ground = turned[0]
+    on_tiles, _ = states(scene(placement, [tile for _, tile, _ in turned], restitution=0.0), 1.0,
+                         accuracy)
+    on_ground, _ = states(scene(placement, ground=ground, restitution=0.0), 1.0, accuracy)
+    np.testing.assert_allclose(on_tiles[:, 0, :3], on_ground[:, 0, :3], atol=tolerance)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+@pytest.mark.parametrize('rise, crossed', [(0.0, True), (0.02, False)])
+def test_a_kerb_on_a_floor_of_tiles_is_an_obstacle(rise, crossed, accuracy):
+    """A box that slides passes the edge of a tile of equal height, and none that stands up."""
+    start = loose(Box((0.2, 0.2, 0.2)), position=(0, 0, 0.1), velocity=(3, 0, 0))
+    tiles = [StaticBody(f'tile_{k}', Box((0.4, 1.0, 1.0)),
+                        position=(0.4 * k, 0.0, -0.5 + rise * (k == 1))) for k in range(3)]
+    rows, _ = states(scene(start, tiles, restitution=0.0), 0.2, accuracy)
+    assert (rows[-1, 0, 0] > 0.3) == crossed
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_the_corner_of_two_tiles_stops_what_comes_from_their_side(accuracy):
+    """A ball that meets the end of their common edge, level with it, is on neither of them."""
+    start = loose(Sphere(0.1), position=(0.2, -1.0, 0.0), velocity=(0, 5, 0))
+    tiles = [StaticBody(f'tile_{k}', Box((0.4, 1.0, 1.0)), position=(0.4 * k, 0.0, -0.5))
+             for k in range(2)]
+    placed = scene(start, tiles, restitution=0.0)
+    rows, _ = states(dataclasses.replace(placed, gravity=(0.0, 0.0, 0.0)), 0.3, accuracy)
+    assert rows[:, 0, 1].max() < -0.6 + 1e-6
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
 def test_a_ball_leaves_a_sphere_where_newton_says(accuracy):
     """Without friction it leaves at cos(angle) = 2/3 of the top, if it starts there at rest; with
     u = v0^2 / g R at (2 + u) / 3.

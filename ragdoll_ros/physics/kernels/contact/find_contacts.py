@@ -14,8 +14,9 @@ from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Contacts, Workspace
-from .gaps import MET, TOUCHING, ground_point, placed_shape
+from .gaps import MET, TOUCHING, ground_point
 from .patch import contract_friction_points
+from .placed_shape import placed_shape
 
 IDS_PER_PAIR = 4096
 """Range of ids that the points of one pair have."""

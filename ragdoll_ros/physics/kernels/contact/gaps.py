@@ -1,7 +1,8 @@
 """Gaps (k,): how far apart is everything that may touch.
 
 In order: heights of each geom's ground points, m; distances of each limited joint from its lower
-and its upper limit, rad; separations of the pairs of geoms, m, where they are far a lower bound.
+and its upper limit, rad; separations of the pairs of geoms, m, where they are far a lower bound,
+and NEAR at internal edges.
 """
 from __future__ import annotations
 
@@ -10,13 +11,15 @@ import math
 import numpy as np
 
 from ..collision.narrow_phase import separation
-from ..collision.shapes import BOX, CAPSULE, SPHERE, Shape, extent, shape_at
+from ..collision.shapes import BOX, CAPSULE, SPHERE, extent
 from ..compiling.decorators import compiled
 from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics, body_velocity, forward_kinematics, place_geoms
 from ..maths.vectors import Vec3, divide, dot, norm, sub, to_local, vec
 from ..system import JOINT_OUTSIDE_LIMITS, OVERLAPPING, System
 from ..workspace import Contacts, Workspace
+from .internal_edges import FLUSH, is_at_internal_edge
+from .placed_shape import placed_shape
 
 TOUCHING = 1e-6
 """m or rad: what is nearer touches."""
@@ -95,6 +98,8 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
         else:
             out[n + k] = pair_gap(s, k, kin)
             narrow_phases += 1
+            if out[n + k] < FLUSH and is_at_internal_edge(s, kin, k, ws.contacts.manifold):
+                out[n + k] = NEAR
     ws.stats[0].ledger.gap_updates += 1
     ws.stats[0].ledger.narrow_phases += narrow_phases
 
@@ -257,12 +262,6 @@ def limit_violated_between(s: System, contacts: Contacts, i: int, j: int) -> boo
             return True
         i = s.tree[i].parent
     return False
-
-
-@compiled
-def placed_shape(s: System, kin: Kinematics, k: int) -> Shape:
-    """Geom k at its pose in ``kin``; after place_geoms()."""
-    return shape_at(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k])
 
 
 @compiled

@@ -8,9 +8,9 @@ import numpy as np
 from ..cluster_state import ClusterState
 from ..collision.narrow_phase import collide
 from ..compiling.decorators import compiled
-from ..contact.gaps import (FAR, NEAR, TOUCHING, ground_point, placed_shape,
-                            update_kinematics_and_gaps)
+from ..contact.gaps import FAR, NEAR, TOUCHING, ground_point, update_kinematics_and_gaps
 from ..contact.jacobian import root_of
+from ..contact.placed_shape import placed_shape
 from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics, body_velocity, velocity_at
 from ..maths.vectors import Vec3, dot, norm, sub, vec
