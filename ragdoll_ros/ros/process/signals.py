@@ -5,8 +5,10 @@ ROS and an engine, and dies by the signal during its exit.
 """
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +16,9 @@ SHUTDOWN_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 PROGRAMS = ('ragdoll_node', 'ragdoll_ros.ros.node', 'ragdoll_ros.ros.run')
 """Scripts and modules whose main() calls run_until_signal."""
+
+REPEAT_DELAY = 0.02
+"""s after which a signal is repeated that hit a callback of C code: time for it to return."""
 
 
 def block_signals() -> None:
@@ -43,16 +48,27 @@ def run_uninterrupted(shutdown: Callable[[], None]) -> None:
 def run_until_signal(run: Callable[[], int]) -> int:
     """Call ``run`` and return its exit code, or 0 if the first shutdown signal ends it.
 
-    Further signals are ignored, also after the return.
+    Further signals are ignored, also after the return. A callback of C code cannot be left by an
+    exception, as while machine code is loaded: the signal is then repeated after it.
     """
     received = []
+    report = sys.unraisablehook
 
     def on_signal(number: int, _: object) -> None:
         received.append(number)
         if len(received) == 1:
             raise KeyboardInterrupt
 
+    def on_unraisable(lost: sys.UnraisableHookArgs) -> None:
+        if lost.exc_type is not KeyboardInterrupt:
+            report(lost)
+            return
+        again = threading.Timer(REPEAT_DELAY, os.kill, (os.getpid(), received.pop()))
+        again.daemon = True
+        again.start()
+
     try:
+        sys.unraisablehook = on_unraisable
         for number in SHUTDOWN_SIGNALS:
             signal.signal(number, on_signal)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SHUTDOWN_SIGNALS)
@@ -62,6 +78,7 @@ def run_until_signal(run: Callable[[], int]) -> int:
     finally:
         for number in SHUTDOWN_SIGNALS:
             signal.signal(number, signal.SIG_IGN)
+        sys.unraisablehook = report
         # After a KeyboardInterrupt in an exec or eval of a string, as in a dataclass, a module that
         # was run by -m would die by SIGINT at its exit, though it was caught. An eval clears that.
         eval('0')

@@ -161,7 +161,12 @@ def alone() -> Iterator[None]:
                 lock = os.open(FOLDER / 'ragdoll_ros.lock', os.O_RDONLY | os.O_CREAT, 0o666)
                 stack.callback(os.close, lock)
                 _wait_for(lock)
-        yield
+        try:
+            yield
+        except KeyboardInterrupt:
+            if TELLER.told:
+                notices.say(notices.INTERRUPTED)
+            raise
 
 
 def _wait_for(lock: int) -> None:
@@ -174,5 +179,5 @@ def _wait_for(lock: int) -> None:
         word.cancel()
 
 
-event.register('numba:compile',
-               notices.Teller(notices.ONCE if KEPT else notices.EVERY_TIME))
+TELLER = notices.Teller(notices.ONCE if KEPT else notices.EVERY_TIME)
+event.register('numba:compile', TELLER)

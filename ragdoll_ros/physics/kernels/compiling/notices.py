@@ -10,6 +10,7 @@ ONCE = 'once'
 EVERY_TIME = ('at every start, as no folder to keep the result in can be written to; the variable '
               'NUMBA_CACHE_DIR may name one')
 NOT_KEPT = 'The compiled dynamics are not kept, the next start compiles them again: {}'
+INTERRUPTED = 'Ending: the next start compiles what is missing'
 WAITING = 'Another process compiles the dynamics: waiting for it'
 
 
@@ -23,13 +24,14 @@ class Teller(event.Listener):
 
     def __init__(self, often: str) -> None:
         self._often = often
-        self._told = False
+        self.told = False
+        """Whether a kernel has been compiled."""
 
     def on_start(self, event: event.Event) -> None:
         """Print the message if numba begins to compile a kernel."""
         module = event.data['dispatcher'].py_func.__module__ or ''
-        if not self._told and module.startswith(__package__.rpartition('.')[0]):
-            self._told = True
+        if not self.told and module.startswith(__package__.rpartition('.')[0]):
+            self.told = True
             say(COMPILING.format(self._often))
 
     def on_end(self, event: event.Event) -> None:
