@@ -18,8 +18,8 @@ EXECUTABLES = {
     'ragdoll_falls': 'ragdoll_ros.falls.command:main',
     'ragdoll_person': 'ragdoll_ros.people.command:main',
 }
-CONFIG, LAUNCH = (sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
-                  for folder in ('config', 'launch'))
+CONFIG, RECIPES, LAUNCH = (sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
+                           for folder in ('config', 'config/recipes', 'launch'))
 LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
 """What `ros2 run` finds in a wheel's lib/ragdoll_ros: the way to the script that pip put in bin."""
 
@@ -41,8 +41,7 @@ class BuildWithConfig(build_py):
         return outputs + [str(target) for _, target in self._config()]
 
     def _config(self) -> list[tuple[str, Path]]:
-        folder = Path(self.build_lib, NAME, 'config')
-        return [(source, folder / Path(source).name) for source in CONFIG]
+        return [(source, Path(self.build_lib, NAME, source)) for source in CONFIG + RECIPES]
 
 
 class InstallDataWithLaunchers(Distribution().get_command_class('install_data')):
@@ -76,6 +75,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', CONFIG),
+        (f'share/{NAME}/config/recipes', RECIPES),
         (f'share/{NAME}/launch', LAUNCH),
     ],
     cmdclass={'build_py': BuildWithConfig, 'install_data': InstallDataWithLaunchers},

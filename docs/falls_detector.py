@@ -2,7 +2,7 @@
 
 python docs/falls_detector.py [--falls 40]
 
-A sensor at the low back, 100 Hz. Falls are those of config/faint.yaml and config/shove.yaml; what
+A sensor at the low back, 100 Hz. Falls are those of config/recipes/faint.yaml and shove.yaml; what
 is no fall is the same people lowered by two hands, at chest and pelvis, to sit or to lie. A random
 forest classifies windows of 0.5 s. Needs scikit-learn.
 """
@@ -25,7 +25,7 @@ WINDOW, STRIDE, AFTER = 50, 10, 30
 
 
 def worn(name: str, seed: int, **changes: object) -> Recipe:
-    """A recipe of config/, limited to 2 s; each seed gives other falls."""
+    """A recipe of config/recipes/, limited to 2 s; each seed gives other falls."""
     return recipe_of({**load_recipe(name).data, 'seed': seed, 'duration': 2.0, **changes})
 
 

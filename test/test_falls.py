@@ -327,6 +327,8 @@ def test_people_that_cannot_be_are_refused(who, path):
 def test_a_recipe_that_is_none_is_refused(tmp_path):
     with pytest.raises(ModelErrors):
         load_recipe('drop')
+    with pytest.raises(ModelErrors, match='a file, or one of faint, shove, tumble'):
+        load_recipe('faints')
     with pytest.raises(OutOfRange):
         recipe().draw(-1)
 

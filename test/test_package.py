@@ -283,7 +283,7 @@ def test_an_executable_is_a_function_of_the_package(place):
 
 def test_wheel_holds_config_twice_and_nothing_foreign(wheel):
     names = zipfile.ZipFile(wheel).namelist()
-    shipped = {path.name for path in (ROOT / 'config').iterdir()}
+    shipped = {path.name for path in (ROOT / 'config').rglob('*.*')}
     for part in ('ragdoll_ros/config/', '.data/data/share/ragdoll_ros/config/'):
         assert {Path(name).name for name in names if part in f'/{name}'} >= shipped, part
     assert 'ragdoll_ros/py.typed' in names
@@ -386,7 +386,7 @@ def test_colcon_build_runs_the_node(ros, environment, tmp_path, option):
         run('colcon', 'build', *option, cwd=tmp_path, PATH=path)
     prefix = tmp_path / 'install/ragdoll_ros'
     assert (prefix / 'share/ament_index/resource_index/packages/ragdoll_ros').is_file()
-    for folder in ('config', 'launch'):
+    for folder in ('config', 'config/recipes', 'launch'):
         shipped = {file.name for file in (ROOT / folder).glob('*.*')}
         assert {file.name for file in prefix.glob(f'share/ragdoll_ros/{folder}/*.*')} == shipped
     assert {file.name for file in (prefix / 'lib/ragdoll_ros').iterdir()} == set(EXECUTABLES)

@@ -6,6 +6,7 @@ import time
 from functools import partial
 from pathlib import Path
 
+from ..files.config import recipe_names
 from ..model.errors import RagdollError
 from . import cluster, describe, pool
 from .formats.registry import FORMATS
@@ -17,7 +18,7 @@ LOG_INTERVAL = 15.0
 """s between lines if stderr is no terminal."""
 
 EXAMPLE = """examples:
-  ragdoll_falls shove -o falls --count 1000       a recipe of config/, Parquet, all cores
+  ragdoll_falls shove -o falls --count 1000       a recipe of config/recipes/, Parquet, all cores
   ragdoll_falls shove -o falls --count 1000 --resume    continue an interrupted run
   ragdoll_falls describe falls                    a page and pictures about the data set
   ragdoll_falls mine.yaml -o csv --format kfall   one CSV file per fall
@@ -64,7 +65,8 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         'ragdoll_falls', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('recipe', help='a YAML file, or a recipe of config/: faint, shove, tumble')
+    parser.add_argument('recipe', help='a YAML file, or a recipe of config/recipes/: '
+                        + ', '.join(recipe_names()))
     parser.add_argument('-o', '--out', type=Path, required=True, metavar='FOLDER',
                         help='output folder of the data set')
     parser.add_argument('--count', type=int, default=100, help='number of falls (%(default)s)')

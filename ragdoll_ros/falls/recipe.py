@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..files import yaml_text
-from ..files.config import find
+from ..files.config import RECIPES, find
 from ..files.doll import build_doll, doll_data
 from ..files.schema import is_marked, read_by_name, schema_errors, value_or_raise
 from ..model import errors
@@ -112,8 +112,8 @@ class Recipe:
 
 
 def load_recipe(name: str | Path) -> Recipe:
-    """Read a recipe by its path or its name in config/; ModelErrors lists every error."""
-    data, path = read_by_name(str(name))
+    """Read a recipe by its path or its name in config/recipes/; ModelErrors lists every error."""
+    data, path = read_by_name(str(name), RECIPES)
     return value_or_raise(path, *build_recipe(data, path))
 
 

@@ -1,9 +1,12 @@
-"""Location of the shipped scenes, dolls and schemas, and look-up by name."""
+"""Location of the shipped scenes, dolls, recipes and schemas, and look-up by name."""
 import os
 import re
 from pathlib import Path
 
 from ..model import errors
+
+RECIPES = 'recipes'
+"""Folder of config/ with the recipes of falls."""
 
 
 def config_folder() -> Path:
@@ -23,13 +26,21 @@ def scene_names() -> list[str]:
                   if re.search(r'^(dolls|bones):', path.read_text(), re.MULTILINE))
 
 
-def find(name: str, beside: Path | None = None) -> Path:
-    """Path of a file given by path (also relative to ``beside``) or by name in config/."""
+def recipe_names() -> list[str]:
+    """Names of the shipped recipes of falls."""
+    return sorted(path.stem for path in (config_folder() / RECIPES).glob('*.yaml'))
+
+
+def find(name: str, beside: Path | None = None, folder: str = '') -> Path:
+    """Path of a file given by path (also relative to ``beside``) or by name in ``folder`` of
+    config/: '' or RECIPES.
+    """
     choices = [Path(os.path.expanduser(name))]
     if beside is not None:
         choices.insert(0, beside / name)
-    choices += [config_folder() / name, config_folder() / f'{name}.yaml']
+    choices += [config_folder() / name, config_folder() / folder / f'{name}.yaml']
     for path in choices:
         if os.path.isfile(path):
             return path
-    raise errors.Unreadable('', name, f'a file, or one of {", ".join(scene_names())}')
+    names = recipe_names() if folder == RECIPES else scene_names()
+    raise errors.Unreadable('', name, f'a file, or one of {", ".join(names)}')

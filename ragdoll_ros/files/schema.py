@@ -99,10 +99,12 @@ def _read(name: str) -> dict:
     return json.loads(text.replace('"doll.schema.json#', '"#'))
 
 
-def read_by_name(name: str) -> tuple[object, Path]:
-    """Data of a YAML file, given by path or shipped name, and its path. Raises ModelErrors."""
+def read_by_name(name: str, folder: str = '') -> tuple[object, Path]:
+    """Data of a YAML file, given by path or by its name in ``folder`` of config/, and its path.
+    Raises ModelErrors.
+    """
     try:
-        path = config.find(name)
+        path = config.find(name, folder=folder)
         return yaml_text.read(path), path
     except ModelError as error:
         raise ModelErrors(str(name), [error]) from None
