@@ -1,15 +1,15 @@
-"""Launches the node and, on request, robot_state_publisher and RViz.
+"""Launches the node and, on request, robot_state_publisher, RViz and foxglove_bridge.
 
 ros2 launch ragdoll_ros ragdoll.launch.py scene:=crowd pace:=0.5 rviz:=true
 """
 from __future__ import annotations
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from launch import LaunchContext, LaunchDescription
+from launch import Action, LaunchContext, LaunchDescription
 from ragdoll_ros.files.config import config_folder
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.files.urdf import scene_to_urdf
@@ -24,7 +24,8 @@ ARGUMENTS = {
     'publish_clock': ('', 'true: publish simulated time on /clock'),
     'use_sim_time': ('', 'true: take time from /clock'),
     'robot_state_publisher': ('false', 'true: it publishes the frames below the root links'),
-    'rviz': ('false', 'true: start RViz')}
+    'rviz': ('false', 'true: start RViz'),
+    'foxglove': ('false', 'true: start foxglove_bridge; config/ragdoll.foxglove.json is a layout')}
 """Default and description of each argument."""
 
 TF_REMAPPINGS = [('/tf', 'tf'), ('/tf_static', 'tf_static')]
@@ -35,6 +36,9 @@ RVIZ_TOPICS = ('markers', 'poses', 'interactive/update', 'interactive/feedback',
 """Topics in config/ragdoll.rviz, relative to /ragdoll."""
 
 
+FOXGLOVE = 'Foxglove: open a connection to ws://localhost:8765, and import the layout {}'
+
+
 def generate_launch_description() -> LaunchDescription:
     """Entry point of `ros2 launch`."""
     declared = [DeclareLaunchArgument(name, default_value=default, description=text)
@@ -42,16 +46,19 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription([*declared, OpaqueFunction(function=make_nodes)])
 
 
-def make_nodes(context: LaunchContext) -> list[Node]:
+def make_nodes(context: LaunchContext) -> list[Action]:
     """The nodes that the launch arguments request; all are checked before one starts."""
     given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     parameters = node_parameters(given, is_installed)
     namespace = given['namespace']
-    nodes = [ragdoll_node(given, parameters)]
+    nodes: list[Action] = [ragdoll_node(given, parameters)]
     if BOOLEANS[given['robot_state_publisher'].lower()]:
         nodes.append(robot_state_publisher(given['scene'] or 'drop', namespace))
     if BOOLEANS[given['rviz'].lower()]:
         nodes.append(rviz(namespace))
+    if BOOLEANS[given['foxglove'].lower()]:
+        nodes += [foxglove_bridge(namespace), LogInfo(msg=FOXGLOVE.format(
+            config_folder() / 'ragdoll.foxglove.json'))]
     return nodes
 
 
@@ -77,6 +84,12 @@ def rviz(namespace: str) -> Node:
     return Node(package='rviz2', executable='rviz2', namespace=namespace,
                 arguments=['-d', str(config_folder() / 'ragdoll.rviz')],
                 remappings=[*TF_REMAPPINGS, *topics, ('/robot_description', 'robot_description')])
+
+
+def foxglove_bridge(namespace: str) -> Node:
+    """What Foxglove connects to."""
+    return Node(package='foxglove_bridge', executable='foxglove_bridge', namespace=namespace,
+                remappings=TF_REMAPPINGS)
 
 
 def is_installed(package: str) -> bool:

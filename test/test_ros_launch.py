@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
+from geometry_msgs.msg import Vector3, Wrench
 
 from ragdoll_ros.ros.parameters.launch_arguments import (
     PARAMETERS,
@@ -90,7 +92,9 @@ def test_arguments_become_parameters_of_the_node(tmp_path):
     ({'params_file': __file__, 'robot_state_publisher': 'true'},
      'robot_state_publisher:=true with a params_file needs scene:=... as well'),
     ({'rviz': 'true'}, 'rviz:=true needs rviz2, which is not installed: sudo apt install '
-                       'ros-$ROS_DISTRO-rviz2')])
+                       'ros-$ROS_DISTRO-rviz2'),
+    ({'foxglove': 'true'}, 'foxglove:=true needs foxglove_bridge, which is not installed: sudo apt '
+                           'install ros-$ROS_DISTRO-foxglove-bridge')])
 def test_what_is_wrong_or_missing_is_told_before_anything_starts(wrong, told):
     with pytest.raises(InvalidLaunchArguments) as caught:
         node_parameters(given(**wrong), lambda package: package == 'robot_state_publisher')
@@ -117,6 +121,29 @@ def test_all_topics_of_the_configuration_of_rviz_go_into_the_namespace(make_node
     view = yaml.safe_load(text)['Visualization Manager']['Views']['Current']
     from ragdoll_ros.files.scene import load_scene
     assert view['Target Frame'] == load_scene('drop').dolls[0].doll.root.name
+
+
+def test_the_layout_of_foxglove_shows_and_sends_what_the_node_offers(make_node):
+    layout = json.loads((ROOT / 'config/ragdoll.foxglove.json').read_text())
+    panels = layout['configById']
+    offered = dict(make_node().get_topic_names_and_types())
+    plotted = {path['value'].split('.')[0] for path in panels['Plot!height']['paths']}
+    assert plotted | {*panels['3D!ragdoll']['topics'], panels['Teleop!arrows']['topic'],
+                      panels['DiagnosticSummary!node']['topicToRender']} <= set(offered)
+    push = panels['Publish!push']
+    assert offered[push['topicName']] == [push['datatype']]
+    Wrench(**{name: Vector3(**{axis: float(value) for axis, value in vector.items()})
+              for name, vector in json.loads(push['value']).items()})
+    assert panels['CallService!reset']['serviceName'] in dict(
+        make_node().get_service_names_and_types())
+    assert sorted(leaves(layout['layout'])) == sorted(panels)
+
+
+def leaves(split):
+    """Panels of a layout, which is divided in two again and again."""
+    if isinstance(split, str):
+        return [split]
+    return leaves(split['first']) + leaves(split['second'])
 
 
 @pytest.mark.slow

@@ -16,7 +16,8 @@ PARAMETERS = {'scene': 'scene', 'pace': 'real_time_factor', 'rate': 'rate',
               'publish_clock': 'publish_clock', 'use_sim_time': 'use_sim_time'}
 """Parameter of the node that an argument sets, unless it is empty."""
 
-NEEDED = {'rviz': 'rviz2', 'robot_state_publisher': 'robot_state_publisher'}
+NEEDED = {'rviz': 'rviz2', 'robot_state_publisher': 'robot_state_publisher',
+          'foxglove': 'foxglove_bridge'}
 """Package that an argument needs, if it is true."""
 
 EMPTY = ('params_file', 'use_sim_time', 'publish_clock', 'rate', 'pace', 'scene')
