@@ -3,8 +3,10 @@ import ast
 import email
 import functools
 import importlib
+import json
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -394,6 +396,33 @@ def test_colcon_build_runs_the_node(ros, environment, tmp_path, option):
     sourced = f'. {tmp_path}/install/setup.sh && exec {prefix}/lib/ragdoll_ros/ragdoll_node "$@"'
     assert poses_published_by(environment / 'bin/python', 'sh', '-c', sourced, 'sh', '--ros-args',
                               '-p', 'scene:=crowd') == 100
+
+
+def test_the_container_installs_what_setup_py_wants():
+    """And each of its commands is one that a shell understands."""
+    text = (ROOT / 'Dockerfile').read_text().replace('\\\n', '')
+    lines = [line.partition(' ') for line in text.splitlines() if not line.startswith('#')]
+    assert [word for word, _, _ in lines] == [
+        'FROM', 'ENV', 'RUN', 'WORKDIR', 'COPY', 'RUN', 'RUN', 'RUN', 'RUN', 'ENTRYPOINT', 'CMD']
+    commands = [rest for word, _, rest in lines if word == 'RUN']
+    for command in commands:
+        subprocess.run(['sh', '-n', '-c', command], check=True)
+    pip, = (command for command in commands if command.startswith('pip'))
+    assert all(f"'{wanted}'" in SETUP for wanted in shlex.split(pip)[2:])
+    for _, _, rest in lines[-2:]:
+        assert all(isinstance(word, str) for word in json.loads(rest))
+    assert json.loads(lines[-1][2])[3] in EXECUTABLES
+
+
+def test_the_conda_environment_has_what_package_xml_wants():
+    tomllib = pytest.importorskip('tomllib')
+    found = tomllib.loads((ROOT / 'pixi.toml').read_text())['dependencies']
+    names = {'python3-pybullet-pip': 'pybullet', 'python3-yaml': 'pyyaml'}
+    wanted = {each.text for each in ElementTree.parse(ROOT / 'package.xml').iter('exec_depend')}
+    for name in wanted:
+        conda = names.get(name, name.removeprefix('python3-') if name.startswith('python3-')
+                          else f'ros-jazzy-{name.replace("_", "-")}')
+        assert conda in found, name
 
 
 def test_the_workflow_runs_what_must_hold():

@@ -34,7 +34,8 @@ TARGETS = set(re.findall(r'^([a-z-]+):.*## ', MAKEFILE, re.M))
 OURS = ('make', 'pip', 'python', 'python3', 'ros2', *EXECUTABLES)
 """Programs whose calls are looked at."""
 
-FOREIGN = {'apt', 'colcon', 'export', 'git', 'pre-commit', 'rosdep', 'rviz2', 'source', 'ssh'}
+FOREIGN = {'apt', 'colcon', 'docker', 'export', 'git', 'pre-commit', 'rosdep', 'rviz2', 'source',
+           'ssh'}
 """Programs that are neither ours nor called with anything of ours."""
 
 
