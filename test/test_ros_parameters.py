@@ -57,6 +57,15 @@ def test_all_are_declared_with_a_description(node):
     assert value(node, 'pushed_bone') == 'torso'
 
 
+def test_the_doll_goes_on_while_another_scene_is_loaded(node):
+    """A thousand dolls take longer than many ticks; a scene that cannot be is refused as before."""
+    before = node.simulation
+    assert put(node, scene='field').successful
+    assert node.simulation is not before and len(node.simulation.scene.dolls) == 1000
+    assert before.time > 10 * before.tick
+    assert 'Unreadable' in put(node, scene='/').reason
+
+
 def test_a_start_that_is_paused_stands_until_it_is_let_go(make_node, peer):
     node = make_node(start_paused=True)
     shown = peer.collect(PoseArray, f'{node.get_fully_qualified_name()}/poses', qos=LATCHED)

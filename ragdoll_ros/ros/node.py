@@ -17,6 +17,7 @@ from rclpy.service import Service
 from rclpy.utilities import remove_ros_args
 from rclpy.waitable import Waitable
 
+from ..files.scene import load_scene
 from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
@@ -96,7 +97,7 @@ class RagdollNode(Node):
             self._publish_start()
         else:
             self._restart_ticker()
-        self._node_parameters.add_callbacks(self._prepare, self._apply)
+        self._node_parameters.add_callbacks(self._load, self._prepare, self._apply)
 
     @property
     def settings(self) -> NodeSettings:
@@ -244,12 +245,17 @@ class RagdollNode(Node):
         self.simulation.close()
         self._set_simulation(simulation)
 
+    def _load(self, name: str) -> Scene:
+        """Load a scene, beside the ticks of the present one."""
+        return self._ticker.run_beside(lambda: load_scene(name))
+
     def _prepare(self, changed: set[str], settings: NodeSettings, scene: Scene) -> None:
         """Before a change is accepted, create the simulation that it needs, as that may fail."""
         if self._prepared is not None:
             self._prepared.close()
-        self._prepared = (make_simulation(scene, settings)
-                          if changed & {'scene', 'engine', 'workers'} else None)
+            self._prepared = None
+        if changed & {'scene', 'engine', 'workers'}:
+            self._prepared = self._ticker.run_beside(lambda: make_simulation(scene, settings))
 
     def _apply(self, changed: set[str]) -> None:
         """Carry out a change of the settings."""

@@ -2,8 +2,11 @@
 from __future__ import annotations
 
 import math
+import sys
+import threading
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
 from rclpy.clock import Clock
 from rclpy.node import Node
@@ -25,6 +28,12 @@ CATCH_UP_RATE = 2
 IDLE_TICKS = 2
 """Ticks per wake-up while idle: a new subscriber or push waits one tick more at most, and no stamp
 is late by more than a tick."""
+
+BESIDE_INTERVAL = 1e-3
+"""s: Python's switch interval while something runs beside the ticks: a tick waits for the
+interpreter that long, a few times."""
+
+Result = TypeVar('Result')
 
 SERVICE_INTERVAL, QOS_EVENT_INTERVAL = 100_000_000, 1_000_000_000
 """ns between two polls of the services and of the QoS events (incompatible QoS of other nodes)."""
@@ -103,6 +112,35 @@ class Ticker:
         """Stop ticking."""
         self._timer.cancel()
         self._running = False
+
+    def run_beside(self, make: Callable[[], Result]) -> Result:
+        """Return what ``make`` returns, or raise what it raises. It runs in a thread; meanwhile the
+        ticks go on, though the callback that called this has not returned.
+        """
+        results: list[Result] = []
+        failures: list[BaseException] = []
+        done = threading.Event()
+
+        def run() -> None:
+            try:
+                results.append(make())
+            except BaseException as error:  # for the thread that waits
+                failures.append(error)
+            finally:
+                done.set()
+
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(BESIDE_INTERVAL)
+        try:
+            threading.Thread(target=run, name='beside ticks', daemon=True).start()
+            while not done.wait(MIN_TIMER_PERIOD / 1e9):
+                if self._running:
+                    self._on_timer()
+        finally:
+            sys.setswitchinterval(interval)
+        if failures:
+            raise failures[0]
+        return results[0]
 
     def _set_ticks_per_wake(self, ticks: int) -> None:
         self._ticks_per_wake, period = ticks, self._pacer.period

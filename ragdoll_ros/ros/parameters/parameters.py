@@ -74,10 +74,11 @@ class Parameters:
         for warning in unknown_parameters(overrides, {*SPECS, *declared}):
             node.get_logger().warning(warning)
 
-    def add_callbacks(self, prepare: Callable[[set[str], NodeSettings, Scene], None],
+    def add_callbacks(self, load: Callable[[str], Scene],
+                      prepare: Callable[[set[str], NodeSettings, Scene], None],
                       apply: Callable[[set[str]], None]) -> None:
         """Register the callbacks that let changes through from now on."""
-        self._prepare, self._apply = prepare, apply
+        self._load, self._prepare, self._apply = load, prepare, apply
         self._node.add_pre_set_parameters_callback(as_doubles)
         self._node.add_on_set_parameters_callback(self._on_set)
         self._node.add_post_set_parameters_callback(self._after_set)
@@ -111,7 +112,7 @@ class Parameters:
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
         given = _settable(parameters)
         try:
-            scene = load_scene(given['scene']) if 'scene' in given else self.scene
+            scene = self._load(given['scene']) if 'scene' in given else self.scene
             settings = dataclasses.replace(self.settings,
                                            **{**self._new_scene_defaults(scene), **given})
             check(settings, scene)
