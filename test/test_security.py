@@ -77,7 +77,9 @@ def imported(path):
 
 
 def runs_what_it_is_given(called, name, call):
-    """Whether a call may run what is in its arguments."""
+    """Whether a call may run what is in its arguments; a number that stands there is no input."""
+    if [ast.unparse(each) for each in call.args] == ["'0'"] and not call.keywords:
+        return False
     if called in EVALUATORS or any(each.arg in ('allow_pickle', 'shell') for each in call.keywords):
         return True
     return called.startswith('yaml.') and name in UNSAFE_YAML and '_Loader' not in map(
@@ -85,7 +87,8 @@ def runs_what_it_is_given(called, name, call):
 
 
 @pytest.mark.parametrize('code, found', [
-    ('eval(t)', True), ('os.system(t)', True), ('yaml.load(t, yaml.Loader)', True),
+    ('eval(t)', True), ("eval('0')", False), ("eval('0', t)", True), ('os.system(t)', True),
+    ('yaml.load(t, yaml.Loader)', True),
     ('np.load(p, allow_pickle=True)', True), ('yaml.load(t, _Loader)', False),
     ('re.compile(t)', False), ('yaml.safe_load(t)', False)])
 def test_what_counts_as_running(tmp_path, code, found):
