@@ -183,6 +183,21 @@ def test_a_link_without_a_mass_gives_its_shapes_to_what_carries_it(tmp_path):
     assert ends == pytest.approx([-0.05, 0.25])
 
 
+def test_a_link_of_next_to_nothing_is_merged_and_named(tmp_path):
+    """As in files of Unitree's robots; else what is written could not be loaded again."""
+    doll, notes = read(tmp_path, link('a'), link('b', mass=4e-15), link('c', mass=0.1), joint('b'),
+                       joint('c', 'b', axis='1 0 0'))
+    assert [bone.name for bone in doll.bones] == ['a', 'c']
+    assert notes == ('b: 4e-15 kg, less than a millionth of the robot: part of a',)
+    made = doll.joints[0]
+    assert (made.parent, made.kind, made.anchor, made.axes) == (
+        'a', 'hinge', (0, 0, 2), ((1, 0, 0),))
+    assert len(doll.bone('a').shape.parts) == 2, "its shape is the parent's"
+    assert {rider.name: rider.bone for rider in doll.riders} == {'a': 'a', 'b': 'a', 'c': 'c'}
+    save_doll(doll, tmp_path / 'doll.yaml')
+    assert load_doll(str(tmp_path / 'doll.yaml')) == doll
+
+
 def test_what_is_only_seen_is_a_body_where_nothing_has_a_mass(tmp_path):
     seen = link('b', mass=0, tag='visual')
     assert len(read(tmp_path, link('a', mass=0), seen, joint('b'))[0].bones) == 2

@@ -106,6 +106,8 @@ def _run(options: argparse.Namespace) -> list[Verdict]:
     elif options.output:
         scene = all_above_ground(Path(options.output).stem, [placement for placement, _, _ in made])
         save_scene(scene, options.output, head)
+    if options.output:
+        load_scene(options.output)  # raises what whoever loads it would read
     for number, (placement, fit, _) in enumerate(made, 1):
         ending = f'_{number}' if len(made) > 1 else ''
         if options.urdf:

@@ -2,11 +2,12 @@
 
 A link with a shape or a mesh becomes a body. Its joint becomes a hinge, or part of a universal or
 ball joint where links without a shape are between (as to_urdf writes them). A link without a shape
-is merged into its parent with its mass and inertia, one without a mass with its shapes. Every
-link's frame becomes a frame of the doll, so that it can be published.
+is merged into its parent with its mass and inertia, one without a mass with its shapes; one that
+weighs next to nothing is fixed to its parent, with both. Every link's frame becomes a frame of the
+doll, so that it can be published.
 """
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,10 @@ from .link_bodies import LinkMeshes, link_shapes, make_bone
 
 ROTATING_KINDS = ('revolute', 'continuous', 'floating', 'spherical')
 """URDF joint kinds that become a joint with angles."""
+
+LIGHTEST_SHARE = 1e-6
+"""Of the robot's mass: lighter links are merged into their parents. Their motion would be that of
+their joints alone, and masses of such ratios are refused (files/doll.py, LARGEST_MASS_RATIO)."""
 
 SAME_POINT = 1e-6
 """m; distance up to which successive axes intersect."""
@@ -67,15 +72,18 @@ def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str
         why = f' ({notes[0]})' if notes else ''
         raise errors.WrongForm('link', list(tree.links)[:5],
                                f'a link with a shape or an inertia{why}')
-    carriers = _find_carriers(tree, shapes)
-    _merge_massless(tree, shapes, carriers, poses)
+    light = _light_links(tree)
+    carriers = _find_carriers(tree, shapes, light)
+    _merge_shapes(tree, shapes, carriers, poses)
+    notes += [f'{name}: {tree.links[name].mass:.2g} kg, less than a millionth of the robot: part '
+              f'of {carriers[name]}' for name in light if shapes[name] and carriers[name] != name]
     names = _unique_names([name for name in tree.links if carriers[name] == name], [WORLD])
     root = next(name for name in tree.order if carriers[name] == name)
     bones = [make_bone(text, shapes[name], tree.links[name], poses[name],
                        [(link, poses[other]) for other, link in tree.links.items()
                         if carriers[other] == name != other and link.mass > 0], notes)
              for name, text in names.items()]
-    joints = [_joint(tree, name, carriers, names, poses, angles, notes)
+    joints = [_joint(tree, name, carriers, light, names, poses, angles, notes)
               for name in names if name != root]
     above = root
     while above in tree.joints:
@@ -87,12 +95,21 @@ def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str
     return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
 
 
-def _find_carriers(tree: UrdfTree, shapes: dict[str, list]) -> dict[str, str]:
-    """Carrier of each link: itself if it becomes a body, else an ancestor or a root's child."""
+def _light_links(tree: UrdfTree) -> list[str]:
+    """Links with a mass that is less than LIGHTEST_SHARE of the robot's."""
+    whole = sum(link.mass for link in tree.links.values())
+    return [name for name, link in tree.links.items() if 0 < link.mass < LIGHTEST_SHARE * whole]
+
+
+def _find_carriers(tree: UrdfTree, shapes: dict[str, list],
+                   light: Collection[str]) -> dict[str, str]:
+    """Carrier of each link: itself if it becomes a body, else an ancestor or a root's child; not
+    itself if it is ``light``.
+    """
     carriers: dict[str, str] = {}
     for name in tree.order:
         above = tree.joints[name].parent if name in tree.joints else None
-        own = bool(shapes[name]) and not (
+        own = bool(shapes[name]) and name not in light and not (
             tree.links[name].mass <= 0 and above in carriers and carriers[above] is not None
             and tree.joints[name].kind == 'fixed')
         carriers[name] = name if own else carriers.get(above)
@@ -101,9 +118,9 @@ def _find_carriers(tree: UrdfTree, shapes: dict[str, list]) -> dict[str, str]:
     return {name: carrier or first for name, carrier in carriers.items()}
 
 
-def _merge_massless(tree: UrdfTree, shapes: dict[str, list], carriers: dict[str, str],
-                    poses: dict[str, Pose]) -> None:
-    """Add the collision shapes of links without a mass to their carriers."""
+def _merge_shapes(tree: UrdfTree, shapes: dict[str, list], carriers: dict[str, str],
+                  poses: dict[str, Pose]) -> None:
+    """Add the collision shapes of links that are no bodies to their carriers."""
     for name, link in tree.links.items():
         carrier = carriers[name]
         if carrier != name and link.collides:
@@ -111,11 +128,15 @@ def _merge_massless(tree: UrdfTree, shapes: dict[str, list], carriers: dict[str,
                                 for shape, place in shapes[name]]
 
 
-def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], names: dict[str, str],
-           poses: dict[str, Pose], angles: dict[str, float], notes: list[str]) -> Joint:
-    """Joint of a body, from the chain of joints between it and its parent body."""
+def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], light: Collection[str],
+           names: dict[str, str], poses: dict[str, Pose], angles: dict[str, float],
+           notes: list[str]) -> Joint:
+    """Joint of a body, from the chain of joints between it and its parent body, or a ``light`` link
+    that is fixed to that.
+    """
     chain = [tree.joints[name]]
-    while chain[0].parent in tree.joints and carriers[chain[0].parent] != chain[0].parent:
+    while (chain[0].parent in tree.joints and carriers[chain[0].parent] != chain[0].parent
+           and chain[0].parent not in light):
         chain.insert(0, tree.joints[chain[0].parent])
     parent, child = names[carriers[chain[0].parent]], names[name]
     anchor = poses[chain[0].child].position
