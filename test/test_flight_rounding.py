@@ -169,7 +169,7 @@ def test_random_chains_and_trees_fly_in_bounded_ticks(first):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('first', range(0, 1000, 100))
-def test_a_thousand_random_chains_and_trees_fly_in_bounded_ticks(first):
-    cut = sum(assert_bounded(number) > 0 for number in range(first, first + 100))
-    assert cut <= 5, 'few are so fast that their ticks are cut short'
+def test_a_thousand_random_chains_and_trees_fly_in_bounded_ticks():
+    """Those that are cut short turn so fast that a tick has more steps than its budget."""
+    cut = sum(assert_bounded(number) > 0 for number in range(1000))
+    assert cut <= 50, 'one in twenty'
