@@ -2,7 +2,20 @@
 import numpy as np
 import pytest
 
-from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation, load_scene
+from ragdoll_ros import (
+    Bone,
+    Compound,
+    Cylinder,
+    Ground,
+    Part,
+    Placement,
+    Ragdoll,
+    Scene,
+    Simulation,
+    StaticBody,
+    load_scene,
+)
+from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import Material
 from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.physics.engine.protocol import GROUND
@@ -41,6 +54,58 @@ def test_a_stack_and_a_ball_beside_it_bear_their_weights(engine):
     assert borne == pytest.approx({(0, GROUND): 2 * MASS * G, (2, 0): MASS * G,
                                    (3, GROUND): MASS * G}, rel=0.02)
     assert np.abs(found.depths).max() < 2e-3
+
+
+@pytest.mark.parametrize('engine', ['rigid', 'bullet', 'mujoco'])
+def test_contacts_say_which_body_is_hit_and_bear_the_weight(engine):
+    """Blocks at rest on the ground, on a table and on a slope of 0.2 rad, each on its own: forces
+    of all contacts, with friction, are its weight; torques keep it from turning.
+    """
+    pytest.importorskip({'rigid': 'numba', 'bullet': 'pybullet'}.get(engine, engine))
+    tilt = tuple(rotation.from_axis_angle((0.0, 1.0, 0.0), 0.2))
+    up = rotation.rotate(tilt, np.array((0.0, 0.0, 1.0)))
+    bodies = (
+        StaticBody('table', Compound((Part(Cylinder(0.05, 0.6), (0, 0, -0.4)),
+                                      Part(Box((1, 1, 0.2))))), position=(3, 0, 0.7)),
+        StaticBody('slope', Box((2, 2, 0.2)), (8, 0, 0.5), tilt))
+    scene = Scene('three', (
+        Placement(BLOCK, 'low', (0, 0, EDGE / 2)), Placement(BLOCK, 'high', (3, 0, 0.8 + EDGE / 2)),
+        Placement(BLOCK, 'tilted', tuple(bodies[1].position + (0.1 + EDGE / 2) * up), tilt)),
+        Ground(), Material(restitution=0, friction=0.7), bodies=bodies)
+    with Simulation(scene, engine=engine, accuracy='exact') as simulation:
+        simulation.run(28)  # and before they sleep
+        found, centers = simulation.contacts, simulation.state.positions
+    assert set(zip(found.a.tolist(), found.b.tolist(), found.bodies.tolist(), strict=True)) == {
+        (0, GROUND, GROUND), (1, GROUND, 0), (2, GROUND, 1)}
+    force, torque = found.wrenches[:, :3], found.wrenches[:, 3:]
+    assert (force * found.normals).sum(axis=1) == pytest.approx(found.forces, abs=1e-6)
+    moments = torque + np.cross(found.positions - centers[found.a], force)
+    # MuJoCo's contacts are springs, which swing a little; PyBullet's blocks tremble on slopes.
+    tolerance = {'rigid': 1e-4, 'bullet': 0.05, 'mujoco': 0.02}[engine] * MASS * G
+    for block in range(3):
+        own = found.a == block
+        assert force[own].sum(axis=0) == pytest.approx((0, 0, MASS * G), abs=tolerance)
+        assert moments[own].sum(axis=0) == pytest.approx((0, 0, 0), abs=tolerance * EDGE)
+
+
+@pytest.mark.parametrize('engine', ['rigid', 'bullet', 'mujoco'])
+def test_friction_is_in_the_wrench_of_what_slides(engine):
+    """A block that slides along x: Coulomb's force against it, mu times the normal force, which is
+    m g where nothing chatters.
+    """
+    pytest.importorskip({'rigid': 'numba', 'bullet': 'pybullet'}.get(engine, engine))
+    start = Placement(BLOCK, 'block', (0, 0, EDGE / 2), velocity=(3, 0, 0))
+    with Simulation(Scene('slide', (start,), Ground(), Material(restitution=0, friction=0.3)),
+                    engine=engine, accuracy='exact') as simulation:
+        each = []
+        for _ in range(40):
+            simulation.advance()
+            each.append(simulation.contacts.wrenches[:, :3].sum(axis=0))
+    x, y, z = np.sum(each, axis=0)
+    assert z > MASS * G
+    assert (x, y) == pytest.approx((-0.3 * z, 0), abs=0.01 * z)
+    if engine == 'rigid':
+        assert np.array(each)[:, 2] == pytest.approx(MASS * G, rel=1e-4)
 
 
 def test_what_sleeps_on_each_other_goes_on_touching_while_others_move():

@@ -167,7 +167,7 @@ def test_updates_of_handles_are_what_rclpy_serializes(frame, name):
 def test_a_contact_s_pose_has_x_along_its_normal():
     assert contact_poses(Contacts.of([])).shape == (0, 7)
     normals = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0.6, 0, -0.8), (0, -1.0, 0)])
-    poses = contact_poses(Contacts.of([[0, GROUND, *range(3), *normal, 0, 0]
+    poses = contact_poses(Contacts.of([[0, GROUND, GROUND, *range(3), *normal, *8 * [0]]
                                        for normal in normals]))
     np.testing.assert_array_equal(poses[:, :3], np.arange(3.0)[None].repeat(5, 0))
     np.testing.assert_allclose(rotation.rotate(poses[:, 3:], np.array([1.0, 0, 0])),

@@ -29,12 +29,17 @@ class MissingEngine(errors.RagdollError):
 
 @dataclass(frozen=True)
 class Contacts:
-    """All c contact points, each between bone ``a`` and bone ``b`` or the GROUND."""
+    """All c contact points, each between bone ``a`` and bone ``b``, a static body or the ground.
+
+    Forces are the impulse of the last substep over its duration.
+    """
 
     a: np.ndarray
     """(c,) bone indices."""
     b: np.ndarray
-    """(c,) bone indices, or GROUND."""
+    """(c,) bone indices, or GROUND for the ground and for static bodies."""
+    bodies: np.ndarray
+    """(c,) indices in Scene.bodies of static bodies, or GROUND for the ground and for bones."""
     positions: np.ndarray
     """(c, 3) m, on the surface of a."""
     normals: np.ndarray
@@ -42,17 +47,20 @@ class Contacts:
     depths: np.ndarray
     """(c,) penetration, m; negative for a gap."""
     forces: np.ndarray
-    """(c,) normal force in the last substep, N."""
+    """(c,) normal force, N."""
+    wrenches: np.ndarray
+    """(c, 6) on a: force with friction, N, and torque about the contact point, N m, world frame."""
 
     def __len__(self) -> int:
         return len(self.a)
 
     @classmethod
     def of(cls, rows: Sequence[Sequence[float]]) -> Contacts:
-        """Make contacts from rows (c, 10): a, b, position, normal, depth, force."""
-        table = np.array(rows, float).reshape(-1, 10)
-        a, b = table[:, :2].T.astype(np.int64)
-        return cls(a, b, table[:, 2:5], table[:, 5:8], table[:, 8], table[:, 9])
+        """Make contacts from rows (c, 17): a, b, body, position, normal, depth, force, wrench."""
+        table = np.array(rows, float).reshape(-1, 17)
+        a, b, bodies = table[:, :3].T.astype(np.int64)
+        return cls(a, b, bodies, table[:, 3:6], table[:, 6:9], table[:, 9], table[:, 10],
+                   table[:, 11:])
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ ACCURACY = 'normal'
 """At the start."""
 
 FEW_BONES = 200
-"""Up to which contacts are kept with each frame, for who looks back: 20 us a tick of one doll."""
+"""Up to which contacts are kept with each frame, for who looks back: 35 us a tick of one doll."""
 
 MAX_NEW_FRAMES = 300
 """That are kept for the page: 3 s of ticks, in which it may draw nothing."""

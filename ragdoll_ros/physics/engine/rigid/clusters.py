@@ -18,6 +18,7 @@ from ...kernels.workspace import Workspace, make_workspace
 from ..protocol import GROUND
 from .broad_phase import NO_PAIRS
 from .build_system import build_system, contact_laws, join_systems, make_pairs
+from .contact_points import contact_points
 from .doll_states import SNAPSHOT, DollStates, contact_capacity
 from .islands import LARGE_CLUSTER, next_window
 from .static_geoms import NO_KEYS, StaticGeoms
@@ -237,34 +238,28 @@ class Clusters:
                 **{name: int(self.stats['ledger'][name].sum()) for name in LEDGER.names}}
 
     def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Contacts (c,) of each cluster's last step; clusters in flight have none. With the bones
-        (c, 2) of the scene that touch, or GROUND, and the length (c,) s of the step.
+        """Contacts (c,) of each cluster's last step; clusters in flight have none. With what
+        touches, (c, 3): two bones of the scene, or GROUND, and the static body, or GROUND; and the
+        length (c,) s of the step.
         """
         if len(self._singles) == 1:
-            found, dt = self._contacts_of_one(), self.stats['last_dt'][0]
-            return _contact_points(found, self._bone_of_body, np.zeros(len(found), np.int64),
-                                   np.full(len(found), dt))
+            return self._points_of(self.members[0], self._bone_of_body)
         arrays, single = self._states.arrays, np.ones(len(self._singles), bool)
         for cluster in self._joined:
             single[cluster.dolls] = False
         known, dolls = self._states.contacts_of(single & (arrays['dense_step']['valid'] == 0))
-        found = [_contact_points(arrays['contacts'][known], self._bone_of_body, self._first[dolls],
-                                 self.stats['last_dt'][dolls])]
-        for cluster in itertools.chain.from_iterable(
-                cluster.islands or [cluster] for cluster in self._joined):
-            stats = cluster.state.stats[0]
-            if not cluster.state.dense_step['valid'][0]:
-                known = cluster.state.contacts[:stats['contact_count']]
-                found.append(_contact_points(known, cluster.bones[cluster.system.tree['bone']],
-                                             np.zeros(len(known), np.int64),
-                                             np.full(len(known), stats['last_dt'])))
+        found = [contact_points(arrays['contacts'][known], self._bone_of_body, self._first[dolls],
+                                np.full(len(known), GROUND), self.stats['last_dt'][dolls])]
+        found += [self._points_of(cluster, cluster.bones[cluster.system.tree['bone']])
+                  for cluster in itertools.chain.from_iterable(
+                      cluster.islands or [cluster] for cluster in self._joined)]
         return tuple(map(np.concatenate, zip(*found, strict=True)))
 
     def on_ground(self) -> np.ndarray:
         """Which bones (n,) have a ground contact; of one doll ten times as fast as contacts()."""
         on = np.zeros(len(self._bone_of_body), bool)
         if len(self._singles) == 1:
-            known = self._contacts_of_one()
+            known = _known_contacts(self.members[0])
             touching = (known['kind'] != LIMIT) & (known['body_b'] < 0)
             on[self._bone_of_body[known['body_a'][touching]]] = True
         else:
@@ -272,11 +267,25 @@ class Clusters:
             on[bones[bones[:, 1] == GROUND, 0]] = True
         return on
 
-    def _contacts_of_one(self) -> np.ndarray:
-        """Contacts, and joints at their limits, of the last step of a scene of one doll."""
-        state = self.members[0].state
-        return state.contacts[:0 if state.dense_step['valid'][0]
-                              else int(state.stats['contact_count'][0])]
+    def _points_of(self, cluster: Cluster,
+                   bone_of_body: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What contacts() returns, of one cluster."""
+        known = _known_contacts(cluster)
+        return contact_points(known, bone_of_body, np.zeros(len(known), np.int64),
+                              self._static_bodies(cluster, known),
+                              np.full(len(known), cluster.state.stats['last_dt'][0]))
+
+    def _static_bodies(self, cluster: Cluster, contacts: np.ndarray) -> np.ndarray:
+        """Indices (c,) of the static bodies that contacts of a cluster touch, or GROUND."""
+        bodies = np.full(len(contacts), GROUND)
+        if len(cluster.static_keys):
+            system, (_, near) = cluster.system, self.static_geoms.bones_and_geoms(
+                cluster.static_keys)
+            static = self.static_geoms.bodies[np.unique(near)]
+            of_geom = np.append(np.full(len(system.geoms) - len(static), GROUND), static)
+            pair = contacts['patch'] - len(system.geoms)
+            bodies[pair >= 0] = of_geom[system.pairs['b'][pair[pair >= 0]]]
+        return bodies
 
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
@@ -527,19 +536,11 @@ def _each_doll(scene: Scene) -> tuple[list[System], list[np.ndarray]]:
     return [system for system, _ in each], [laws for _, laws in each]
 
 
-def _contact_points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,
-                    dt: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Contacts that are no limits, with bones and times as Clusters.contacts() returns them.
-
-    Their bodies count from ``first`` (c,) in ``bone_of_body``, which gives bones of the scene.
-    """
-    found = np.flatnonzero(contacts['kind'] != LIMIT)
-    # take: an index in brackets copies such wide records field by field
-    contacts, first, dt = contacts.take(found), first[found], dt[found]
-    bones = np.empty((len(contacts), 2), np.int64)
-    bones[:, 0] = bone_of_body[first + contacts['body_a']]
-    bones[:, 1] = np.where(contacts['body_b'] < 0, GROUND, bone_of_body[first + contacts['body_b']])
-    return contacts, bones, np.where(dt > 0, dt, 1.0)
+def _known_contacts(cluster: Cluster) -> np.ndarray:
+    """Contacts, and joints at their limits, of a cluster's last step; none in flight."""
+    state = cluster.state
+    return state.contacts[:0 if state.dense_step['valid'][0]
+                          else int(state.stats['contact_count'][0])]
 
 
 def _copied(state: ClusterState) -> ClusterState:

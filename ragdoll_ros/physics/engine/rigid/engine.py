@@ -18,6 +18,7 @@ from ..doll_totals import DollTotals
 from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, allowed_penetration
 from .broad_phase import BroadPhase
 from .clusters import Cluster, Clusters
+from .contact_points import contact_wrenches
 from .loads import NO_LOADS, NO_SPRINGS, load_records, spring_records
 
 ERROR_STEP_RATIO = 0.25
@@ -160,9 +161,9 @@ class RigidEngine:
         return found
 
     def contacts(self) -> Contacts:
-        found, bones, dt = self._clusters.contacts()
-        return Contacts(bones[:, 0], bones[:, 1], found['point'], found['normal'], -found['gap'],
-                        found['impulse'][:, 0] / dt)
+        found, touching, dt = self._clusters.contacts()
+        return Contacts(*touching.T, found['point'], found['normal'], -found['gap'],
+                        found['impulse'][:, 0] / dt, contact_wrenches(found, dt))
 
     def bones_on_ground(self) -> np.ndarray:
         return self._clusters.on_ground()

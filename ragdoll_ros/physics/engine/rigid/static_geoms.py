@@ -31,6 +31,9 @@ class StaticGeoms:
         self.geoms = np.zeros(len(parts), GEOM)
         self.laws = np.zeros((len(parts), 3))
         """(g, 3): friction, rolling friction, m, and restitution of each geom."""
+        place = {body.name: index for index, body in enumerate(scene.bodies)}
+        self.bodies = np.array([place[body.name] for body, _ in parts], np.int64)
+        """(g,): index of each geom's body in the scene's bodies."""
         for k, (geom, (body, part)) in enumerate(zip(self.geoms, parts, strict=True)):
             geom['body'], geom['kind'] = WORLD, SHAPE_KIND[part.kind]
             geom['size'] = geom_size(part.shape)

@@ -88,8 +88,8 @@ class _World:
             deterministicOverlappingPairs=1, enableFileCaching=0, useSplitImpulse=0, contactSlop=0,
             physicsClientId=client)
         pybullet.setGravity(*scene.gravity, physicsClientId=client)
-        self.static = [*self._add_ground(), *self._add_bodies()]
-        """Bodies that never move."""
+        self.static = {**dict.fromkeys(self._add_ground(), GROUND), **dict(self._add_bodies())}
+        """Index in the scene's bodies, or GROUND, of PyBullet's bodies that never move."""
         self.dolls = [self._add_doll(placement) for placement in scene.dolls]
 
     def _add_ground(self) -> Iterator[int]:
@@ -103,16 +103,16 @@ class _World:
         self._set_material(body, -1, None)
         yield body
 
-    def _add_bodies(self) -> Iterator[int]:
-        """Add each part of the static bodies as a body of its own."""
-        for one in self.scene.bodies:
+    def _add_bodies(self) -> Iterator[tuple[int, int]]:
+        """Add each part of the static bodies as a body of its own; these, and the scene's."""
+        for index, one in enumerate(self.scene.bodies):
             for part in one.parts:
                 shape = pybullet.createCollisionShape(
                     _GEOMS[part.kind], physicsClientId=self._client, **_sizes(part.shape))
                 body = pybullet.createMultiBody(0, shape, -1, part.position, part.orientation,
                                                 physicsClientId=self._client)
                 self._set_material(body, -1, one)
-                yield body
+                yield body, index
 
     def _add_doll(self, placement: Placement) -> _Doll:
         doll = placement.doll
@@ -206,11 +206,12 @@ class BulletEngine(SubsteppedEngine):
         substeps = self._timing[1] if self._timing else 1
         for point in pybullet.getContactPoints(physicsClientId=self._client):
             a, b = self._bone_of.get(point[1:4:2]), self._bone_of.get(point[2:5:2])
-            position, normal = point[5], np.array(point[7])
+            position, normal, body = point[5], np.array(point[7]), point[2]
+            force = substeps * (point[9] * normal + np.dot(point[10:14:2], point[11:15:2]))
             if a is None:
-                a, b, position, normal = b, GROUND, point[6], -normal
-            found.append([a, GROUND if b is None else b, *position, *normal, -point[8],
-                          point[9] * substeps])
+                a, b, position, normal, body, force = b, None, point[6], -normal, point[1], -force
+            found.append([a, GROUND if b is None else b, self._static.get(body, GROUND), *position,
+                          *normal, -point[8], point[9] * substeps, *force, 0.0, 0.0, 0.0])
         return Contacts.of(found)
 
     def close(self) -> None:
@@ -224,6 +225,7 @@ class BulletEngine(SubsteppedEngine):
         self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
         self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
         self._doll_of |= dict.fromkeys(world.static, GROUND)
+        self._static = world.static
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
         self.set_coordinates(self.coordinates)
 

@@ -58,11 +58,13 @@ class MujocoEngine(SubsteppedEngine):
             a, b = (self._bone_of.get(geom, GROUND) for geom in contact.geom)
             self._mujoco.mj_contactForce(self._model, self._data, index, force)
             # MuJoCo's normal points from the first geom to the second, ours from b to a
-            normal, position = -contact.frame[:3].copy(), contact.pos.copy()
+            frame, body = -contact.frame.reshape(3, 3), contact.geom[1]
             if a == GROUND:
-                a, b, normal = b, GROUND, -normal
-            position += normal * contact.dist / 2
-            found.append([a, b, *position, *normal, -contact.dist, force[0]])
+                a, b, frame, body = b, GROUND, -frame, contact.geom[0]
+            arm = frame[0] * contact.dist / 2
+            pull, torque = force[:3] @ frame, force[3:] @ frame
+            found.append([a, b, self._static.get(body, GROUND), *contact.pos + arm, *frame[0],
+                          -contact.dist, force[0], *pull, *torque - np.cross(arm, pull)])
         return Contacts.of(found)
 
     def close(self) -> None:
@@ -159,6 +161,10 @@ class MujocoEngine(SubsteppedEngine):
         bones = {int(body): bone for bone, body in enumerate(self._bodies)}
         self._bone_of = {geom: bones[body] for geom, body in enumerate(self._model.geom_bodyid)
                          if body in bones}
+        self._static = {
+            self._model.geom(f'bodies/{body.name}/{number}').id: index
+            for index, body in enumerate(self.scene.bodies)
+            for number, _ in enumerate(body.parts, 1)}
         self._doll_of = np.full(self._model.ngeom, GROUND)
         self._doll_of[list(self._bone_of)] = self.scene.doll_of_bone[list(self._bone_of.values())]
         self._roots, self._balls = [], []

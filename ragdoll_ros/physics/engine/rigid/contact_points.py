@@ -1,0 +1,32 @@
+"""Contacts of clusters' last steps as points between bones of the scene, with their wrenches."""
+import numpy as np
+
+from ...kernels.contact_kind import LIMIT
+from ..protocol import GROUND
+
+
+def contact_points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,
+                   static: np.ndarray,
+                   dt: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Contacts that are no limits, with what touches and times as Clusters.contacts() returns them.
+
+    Their bodies count from ``first`` (c,) in ``bone_of_body``, which gives bones of the scene;
+    ``static`` (c,): static bodies, or GROUND.
+    """
+    found = np.flatnonzero(contacts['kind'] != LIMIT)
+    # take: an index in brackets copies such wide records field by field
+    contacts, first, dt = contacts.take(found), first[found], dt[found]
+    a, other = bone_of_body[first + contacts['body_a']], contacts['body_b']
+    b = np.where(other < 0, GROUND, bone_of_body[first + other])
+    return contacts, np.stack([a, b, static[found]], 1), np.where(dt > 0, dt, 1.0)
+
+
+def contact_wrenches(contacts: np.ndarray, dt: np.ndarray) -> np.ndarray:
+    """Wrenches (c, 6) on the first bone of each CONTACT, by its impulse over its step of ``dt`` s:
+    force, N, and torque about its point, N m, world frame.
+    """
+    impulse = contacts['impulse'] / dt[:, None]
+    friction = np.einsum('ck,ckx->cx', impulse[:, 1:3], contacts['tangents'])
+    torque = np.cross(contacts['friction_point'] - contacts['point'], friction)
+    torque += np.einsum('ck,ckx->cx', impulse[:, 3:], contacts['tangents'])
+    return np.concatenate([impulse[:, :1] * contacts['normal'] + friction, torque], axis=1)
