@@ -13,10 +13,12 @@ from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.push import ARROW_LENGTH, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
-from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.model.scene import Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box
 from ragdoll_ros.model.static_body import StaticBody
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.ros.messages.contact_wrenches import to_contact_wrenches
+from ragdoll_ros.ros.messages.convert import contact_poses
 from ragdoll_ros.ros.messages.interactive_markers import SCALE, InteractiveMarkers
 from ragdoll_ros.ros.messages.markers import SceneMarkers
 from ragdoll_ros.ros.ticker import PollThrottle
@@ -58,6 +60,28 @@ def test_markers_show_static_bodies_where_they_stand(lone):
     assert (place.x, place.y, place.z) == body.position
     assert (turn.x, turn.y, turn.z, turn.w) == body.orientation
     assert (marker.type, size.x, size.y, size.z) == (Marker.CUBE, 0.1, 2.0, 3.0)
+
+
+def test_contact_wrenches_name_what_touches_and_bear_the_weight():
+    """A box of 1 kg on a table, another on it."""
+    box = Ragdoll('box', (Bone('box', Box((0.2, 0.2, 0.2)), 1.0, (0, 0, 0)),))
+    table = StaticBody('table', Box((1, 1, 1)))
+    scene = Scene('pile', (Placement(box, 'low', (0, 0, 0.6)), Placement(box, 'high', (0, 0, 0.8))),
+                  material=Material(restitution=0.0), bodies=(table,))
+    with Simulation(scene) as simulation:
+        simulation.run(10)
+        message = to_contact_wrenches('map', scene, 5, simulation.contacts)
+        places = contact_poses(simulation.contacts)[:, :3]
+    assert (message.header.frame_id, message.header.stamp.nanosec) == ('map', 5)
+    force = {}
+    for name, wrench in zip(message.joint_names, message.wrench, strict=True):
+        force[name] = force.get(name, 0.0) + wrench.force.z
+    between = next(name for name in force if 'table' not in name)
+    assert between in ('low/box//high/box', 'high/box//low/box')
+    sign = -1 if between.startswith('low') else 1
+    assert force == pytest.approx({'low/box//table': 2 * 9.8, between: sign * 9.8}, rel=1e-4)
+    assert [(one.translation.x, one.translation.y, one.translation.z)
+            for one in message.transforms] == [tuple(place) for place in places.tolist()]
 
 
 def test_ghosts_to_drag_fill_the_shape_of_a_bone_too(lone):

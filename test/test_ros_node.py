@@ -88,8 +88,10 @@ def test_a_node_with_listeners_leaves_the_simulation_its_bits(make_node, peer):
     node = make_node()
     heard = [peer.collect(kind, topic) for kind, topic in (
         (PoseArray, 'ragdoll/poses'), (MultiDOFJointState, 'ragdoll/state'),
-        (JointState, 'joint_states'), (MarkerArray, 'ragdoll/markers'))]
-    peer.wait_heard(node, POSES, '/ragdoll/state', '/joint_states', MARKERS)
+        (JointState, 'joint_states'), (MarkerArray, 'ragdoll/markers'),
+        (MultiDOFJointState, 'ragdoll/contact_wrenches'))]
+    peer.wait_heard(node, POSES, '/ragdoll/state', '/joint_states', MARKERS,
+                    '/ragdoll/contact_wrenches')
     alone = digest(plain(320))
     assert digest(played(node, 320)) == alone
     node.reset()

@@ -18,6 +18,7 @@ from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
 from .humans.publishers import Humans
 from .latched_topic import LATCHED, LATCHED_HISTORY, LatchedTopic, overridable_publisher
+from .messages.contact_wrenches import to_contact_wrenches
 from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
 from .messages.measures import TickMeasures, checksum, serialize_measures
 from .messages.serialized import serialize_pose_array
@@ -44,6 +45,7 @@ class Outputs:
         """The simulation that was published last, its reset_count, and the number of that run."""
         self._swings: LatchedTopic | None = None
         self._contacts = overridable_publisher(node, PoseArray, '~/contacts', 10)
+        self._wrenches = overridable_publisher(node, MultiDOFJointState, '~/contact_wrenches', 10)
         self._markers = LatchedTopic(node, MarkerArray, '~/markers')
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._tf = TfPublisher(node)
@@ -71,7 +73,7 @@ class Outputs:
                 or any(topic is not None and topic.has_subscribers
                        for topic in (self._measures, self._poses, self._swings))
                 or any(topic.get_subscription_count()
-                       for topic in (self._state, self._joints, self._contacts)))
+                       for topic in (self._state, self._joints, self._contacts, self._wrenches)))
 
     def publish(self, simulation: Simulation, stamp: int, now: int, paused: bool = False) -> None:
         """Publish the simulation's state with ``stamp``, ns, on topics with subscribers, markers at
@@ -94,6 +96,9 @@ class Outputs:
         if self._contacts.get_subscription_count():
             self._contacts.publish(serialize_pose_array(self._frame, stamp,
                                                         contact_poses(simulation.contacts)))
+        if self._wrenches.get_subscription_count():
+            self._wrenches.publish(to_contact_wrenches(self._frame, simulation.scene, stamp,
+                                                       simulation.contacts))
         if not (paused or self._markers.has_subscribers):
             self._markers.forget()
         elif paused or now >= self._next_markers:
