@@ -1,28 +1,42 @@
-"""`bodies:` of a scene: static bodies, each alone or repeated."""
-from ..model.errors import ModelError, OutOfRange
+"""`bodies:` of a scene, each alone or repeated: static ones, and loose ones, which have a mass."""
+from ..model.compound import Compound
+from ..model.errors import ModelError, OutOfRange, WrongForm
+from ..model.pose import Pose
+from ..model.ragdoll import Bone, Ragdoll
 from ..model.rotation import IDENTITY
-from ..model.static_body import StaticBody
+from ..model.scene import Placement
+from ..model.static_body import DEFAULT_COLOR, StaticBody
+from ..model.vectors import floats
 from .doll import build_shape, shape_data
 from .repeat import repeated
 from .schema import entries, has_error_under, try_build
 
 MOST_BODIES = 100_000
 
+MOTION = ('velocity', 'spin')
+"""Keys of loose bodies alone."""
 
-def build_bodies(data: dict, found: list[ModelError]) -> tuple[StaticBody, ...]:
-    """The bodies of a scene's data. Appends every error to ``found``."""
-    bodies: list[StaticBody] = []
+
+def build_bodies(data: dict,
+                 found: list[ModelError]) -> tuple[tuple[StaticBody, ...], list[Placement]]:
+    """The static bodies of a scene's data, and the loose ones as dolls of one bone. Appends every
+    error to ``found``.
+    """
+    static: list[StaticBody] = []
+    loose: list[Placement] = []
     for index, entry in enumerate(entries(data, 'bodies')):
         where = f'bodies[{index}]'
         if has_error_under(found, where):
             continue
-        first = try_build(found, where, _body, entry)
+        first = try_build(found, where, _loose_body if 'mass' in entry else _static_body, entry)
         if first:
-            bodies += repeated(first, entry['repeat']) if 'repeat' in entry else [first]
-        if len(bodies) > MOST_BODIES:
-            found.append(OutOfRange(where, len(bodies), f'at most {MOST_BODIES} bodies in all'))
+            copies = repeated(first, entry['repeat']) if 'repeat' in entry else [first]
+            (loose if 'mass' in entry else static).extend(copies)
+        if len(static) + len(loose) > MOST_BODIES:
+            found.append(OutOfRange(where, len(static) + len(loose),
+                                    f'at most {MOST_BODIES} bodies in all'))
             break
-    return tuple(bodies)
+    return tuple(static), loose
 
 
 def body_data(body: StaticBody) -> dict:
@@ -35,7 +49,25 @@ def body_data(body: StaticBody) -> dict:
             **{key: value for key, value in optional.items() if value is not None}}
 
 
-def _body(entry: dict) -> StaticBody:
+def _static_body(entry: dict) -> StaticBody:
+    for key in MOTION:
+        if key in entry:
+            raise WrongForm(key, entry[key], 'a mass as well: a body without one never moves')
     fields = {key: value for key, value in entry.items()
               if key not in ('shape', 'shapes', 'repeat')}
     return StaticBody(shape=build_shape(entry), **fields)
+
+
+def _loose_body(entry: dict) -> Placement:
+    """A doll of one bone: a uniform solid, its frame that of the body's shape."""
+    shape = build_shape(entry)
+    # A bone's frame has its centre of mass and principal axes.
+    pose = shape.principal_pose() if isinstance(shape, Compound) else Pose()
+    if isinstance(shape, Compound):
+        shape = shape.in_frame(pose)
+    surface = {key: entry[key] for key in ('friction', 'rolling_friction', 'restitution')
+               if key in entry}
+    bone = Bone(entry['name'], shape, entry['mass'], floats(pose.position),
+                floats(pose.orientation), color=tuple(entry.get('color', DEFAULT_COLOR)), **surface)
+    start = {key: entry[key] for key in ('position', 'orientation', *MOTION) if key in entry}
+    return Placement(Ragdoll(entry['name'], (bone,)), **start)

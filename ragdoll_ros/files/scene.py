@@ -101,7 +101,12 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
         if len(placements) > MOST_DOLLS:
             found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
             break
-    parts: dict[str, Any] = {'bodies': build_bodies(data, found)}
+    static, loose = build_bodies(data, found)
+    placements += loose
+    if len(placements) > MOST_DOLLS and loose:
+        found.append(OutOfRange('bodies', len(placements),
+                                f'at most {MOST_DOLLS} dolls and loose bodies in all'))
+    parts: dict[str, Any] = {'bodies': static}
     for key, part in (('ground', Ground), ('material', Material)):
         if isinstance(data.get(key), dict) and not has_error_under(found, key):
             parts[key] = try_build(found, key, part, **data[key])
