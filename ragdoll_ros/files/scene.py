@@ -1,5 +1,6 @@
 """Scenes as YAML files (config/scene.schema.json): reading with all errors at once, writing."""
 import functools
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,9 @@ from .schema import (
 )
 
 MOST_DOLLS = 1000
+
+ANGLE_KEYS = {'angles': 'angles_deg', 'rates': 'rates_deg_s'}
+"""Key of a doll's entry for each field of a Placement that is in rad or rad/s."""
 
 
 def load_scene(name: str) -> Scene:
@@ -94,8 +98,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
             doll, more = _with_swings(doll, entry, path)
             found += [error.at(where) for error in more]
         if doll is not None and not has_error_under(found, where):
-            fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
-            first = try_build(found, where, Placement, doll, **{key: entry[key] for key in fields})
+            first = try_build(found, where, _placement, doll, entry)
             placements += repeated(first, entry['repeat']) if (
                 first and 'repeat' in entry) else [first]
         if len(placements) > MOST_DOLLS:
@@ -139,6 +142,10 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
         entry = {'doll': dolls[id(placement.doll)], 'name': placement.name}
         for key in ('position', 'orientation', 'velocity', 'spin'):
             entry[key] = list(getattr(placement, key))
+        for name, key in ANGLE_KEYS.items():
+            if values := getattr(placement, name):
+                entry[key] = {angle: round(math.degrees(value), 9)
+                              for angle, value in values.items()}
         data['dolls'].append(entry)
     if scene.bodies:
         data['bodies'] = [body_data(body) for body in scene.bodies]
@@ -148,6 +155,22 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
 def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
     """YAML of a scene for a file in ``folder``."""
     return yaml_text.to_text(scene_data(scene, folder), 'scene', head)
+
+
+def _placement(doll: Ragdoll, entry: dict) -> Placement:
+    """The doll as an entry of the scene places it; errors of angles are in degrees."""
+    keys = 'position', 'orientation', 'velocity', 'spin', 'name'
+    fields: dict[str, Any] = {key: entry[key] for key in keys if key in entry}
+    for name, key in ANGLE_KEYS.items():
+        fields[name] = {angle: math.radians(value) for angle, value in entry.get(key, {}).items()}
+    try:
+        return Placement(doll, **fields)
+    except ModelError as error:
+        name, _, angle = error.path.partition('.')
+        if name not in ANGLE_KEYS:
+            raise
+        key = ANGLE_KEYS[name]
+        raise type(error)(f'{key}.{angle}', entry[key][angle], error.expected) from None
 
 
 def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:

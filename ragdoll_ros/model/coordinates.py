@@ -7,6 +7,7 @@ import numpy as np
 
 from . import errors, rotation
 from .ragdoll import Limits, Ragdoll
+from .scene import Placement
 
 UNLIMITED: Limits = (-math.inf, math.inf)
 
@@ -117,6 +118,19 @@ class DofLayout:
         q[self._angles[free]] = angles[free]
         return q
 
+    def with_joint_rates(self, coordinates: GeneralizedState, rates: np.ndarray) -> np.ndarray:
+        """A copy of the velocities v with joint rates (k,) rad/s: the inverse of joint_rates()."""
+        v = coordinates.v.copy()
+        free = np.ones(len(rates), bool)
+        for own, at, spin in self._free_angles:
+            free[own] = False
+            angles = rotation.to_euler_xyz(coordinates.q[at])
+            # Linear in the spin: a column for each of its components.
+            v[spin] = np.linalg.solve(np.transpose([
+                rotation.euler_xyz_rates(angles, unit) for unit in np.eye(3)]), rates[own])
+        v[self._rates[free]] = rates[free]
+        return v
+
     def joint_rates(self, coordinates: GeneralizedState) -> np.ndarray:
         """Time derivatives (k,) rad/s of joint_angles()."""
         rates = coordinates.v[self._rates]
@@ -134,3 +148,21 @@ class DofLayout:
     def _indices(starts: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:
         table = np.array(starts, int).reshape(-1, 2)
         return table[:, :1] + np.arange(4), table[:, 1:] + np.arange(3)
+
+
+def placed_coordinates(placements: Sequence[Placement]) -> GeneralizedState:
+    """Coordinates and velocities of dolls as they are placed: where a simulation starts."""
+    layout = DofLayout([placement.doll for placement in placements])
+    q, v = np.zeros(layout.sizes[0]), np.zeros(layout.sizes[1])
+    for index, placement in enumerate(placements):
+        pose = placement.bone_pose(placement.doll.root)
+        q[layout.root_positions[index]] = pose.position
+        q[layout.root_orientations[index]] = pose.orientation
+        v[layout.root_velocities[index]] = placement.root_velocity()
+        v[layout.root_angular_velocities[index]] = placement.spin
+    angles, rates = (np.array([
+        getattr(placement, key).get(name, 0.0) for placement in placements
+        for joint in placement.doll.joints for name in joint.angle_names])
+        for key in ('angles', 'rates'))
+    state = GeneralizedState(layout.with_joint_angles(q, angles), v)
+    return GeneralizedState(state.q, layout.with_joint_rates(state, rates))

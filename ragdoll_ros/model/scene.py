@@ -5,7 +5,7 @@ files/scene.py reads and writes it.
 """
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
+from .forward_kinematics import BoneMotion, bone_motions
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
 from .rotation import IDENTITY
@@ -33,6 +34,9 @@ NO_SLIP = 0.7
 solver alternates between normal and friction; where friction opens the contact (above 4/3 for a
 rod, less for a chain) the iteration diverges: at 10, and sometimes at 0.8, a sliding contact
 carried no load after an even number of iterations."""
+
+LIMIT_TOLERANCE = 1e-9
+"""rad by which an initial angle may be outside its limits, as both are rounded."""
 
 LARGEST_FRICTION = 10.0
 """Upper bound of finite coefficients in PyBullet and MuJoCo, PyBullet's own."""
@@ -89,7 +93,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class Placement:
-    """A doll in a scene, in its bind pose, with its initial pose and velocity in the world frame.
+    """A doll in a scene, with its initial pose and velocity in the world frame.
 
     Args:
         doll: the Ragdoll.
@@ -97,10 +101,15 @@ class Placement:
         position: (3,) m, of the doll's frame.
         orientation: quaternion x, y, z, w, of the doll's frame; normalised.
         velocity: (3,) m/s, of the doll's centre of mass.
-        spin: (3,) rad/s, angular velocity of the whole doll about its centre of mass.
+        spin: (3,) rad/s, angular velocity of the whole doll about its centre of mass; with rates
+            that of its root.
+        angles: initial joint angles, rad, by the names of the doll's angles; 0 where none is given.
+            They are rounded to 1e-9 degrees, so that files in degrees read back to the same bits.
+        rates: initial rates of joint angles, rad/s; rounded likewise.
 
     Raises:
         NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none.
+        UnknownJoint, OutOfRange: for an angle that the doll does not have, or outside its limits.
 
     Example:
         >>> Placement(load_doll('doll'), position=(0, 1, 0.5), spin=(0, 2, 0)).name
@@ -113,21 +122,54 @@ class Placement:
     orientation: Quaternion = IDENTITY
     velocity: Vector = (0.0, 0.0, 0.0)
     spin: Vector = (0.0, 0.0, 0.0)
+    angles: Mapping[str, float] = field(default_factory=dict, hash=False)
+    rates: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         for key in ('position', 'velocity', 'spin'):
             set_fields(self, **{key: finite_floats(key, getattr(self, key))})
+        for key in ('angles', 'rates'):
+            set_fields(self, **{key: _checked_angles(self.doll, key, getattr(self, key))})
         set_fields(self, name=self.name or self.doll.name, orientation=unit_vector(
             'orientation', self.orientation, 'a quaternion x, y, z, w, not zero', 4))
 
     def bone_pose(self, bone: Bone) -> Pose:
         """Initial pose of a bone, world frame."""
-        return Pose(np.array(self.position), np.array(self.orientation)).compose(bone.pose)
+        here = self._motions[bone.name].pose(bone) if self.angles else bone.pose
+        return Pose(np.array(self.position), np.array(self.orientation)).compose(here)
 
     def root_velocity(self) -> np.ndarray:
         """Initial velocity (3,) m/s of the root's centre of mass, world frame."""
-        arm = rotation.rotate(self.orientation, self.doll.root.position - self.doll.mass_centre)
-        return self.velocity + np.cross(self.spin, arm)
+        centre, drift = self.doll.mass_centre, np.zeros(3)
+        if self.angles or self.rates:
+            shares = np.array([bone.mass / self.doll.mass for bone in self.doll.bones])
+            motions = [self._motions[bone.name] for bone in self.doll.bones]
+            centre = shares @ [motion.position for motion in motions]
+            drift = rotation.rotate(self.orientation, shares @ [
+                motion.velocity for motion in motions])
+        arm = rotation.rotate(self.orientation, self.doll.root.position - centre)
+        return self.velocity + np.cross(self.spin, arm) - drift
+
+    @cached_property
+    def _motions(self) -> dict[str, BoneMotion]:
+        return bone_motions(self.doll, self.angles, self.rates)
+
+
+def _checked_angles(doll: Ragdoll, key: str, given: Mapping[str, float]) -> dict[str, float]:
+    """The ``given`` angles or rates, if the doll has them; angles within their limits."""
+    limits = {name: pair for joint in doll.joints
+              for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+    for name, value in given.items():
+        where = f'{key}.{name}'
+        if name not in limits:
+            raise errors.UnknownJoint(where, name, errors.one_of(list(limits), name))
+        errors.check_finite(where, value)
+        lower, upper = limits[name] or (-math.inf, math.inf)
+        if key == 'angles' and not lower - LIMIT_TOLERANCE <= value <= upper + LIMIT_TOLERANCE:
+            raise errors.OutOfRange(
+                where, value, f'{lower:.4g} to {upper:.4g} rad, its limits: '
+                f'{math.degrees(lower):.4g} to {math.degrees(upper):.4g} degrees')
+    return {name: math.radians(round(math.degrees(value), 9)) for name, value in given.items()}
 
 
 @dataclass(frozen=True, repr=False)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from ..model import errors
-from ..model.coordinates import GeneralizedState
+from ..model.coordinates import GeneralizedState, placed_coordinates
 from ..model.drive import Drive
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
@@ -93,6 +93,9 @@ class Simulation:
         self._make = partial(choice.make, scene, workers=int(workers))
         self._engine: Engine = self._make(resolve_accuracy(accuracy))
         self._placed: GeneralizedState | None = None
+        if any(placement.angles or placement.rates for placement in scene.dolls):
+            self._placed = placed_coordinates(scene.dolls)
+            self._engine.set_coordinates(self._placed)
         self._start = self._engine.save()
         self._sleep_detector, self._stability_test = SleepDetector(scene), StabilityTest(scene)
         self._swings = _swings(scene)

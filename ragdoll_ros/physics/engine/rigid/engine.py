@@ -8,7 +8,7 @@ from collections.abc import Generator, Iterable
 import numpy as np
 
 from ....model import rotation
-from ....model.coordinates import DofLayout, GeneralizedState
+from ....model.coordinates import DofLayout, GeneralizedState, placed_coordinates
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import DRAFT, Accuracy
@@ -53,7 +53,7 @@ class RigidEngine:
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]
         """Pairs that overlap at the start: they are excluded until they separate."""
-        self.set_coordinates(self._placed_coordinates())
+        self.set_coordinates(placed_coordinates(scene.dolls))
         self._initial_overlaps = self._clusters.excluded(OVERLAPPING)
 
     @property
@@ -313,20 +313,6 @@ class RigidEngine:
         for doll in (doll for doll in dolls if sunk[doll]):
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)
-
-    def _placed_coordinates(self) -> GeneralizedState:
-        """Coordinates of the scene's placements, joints in the bind pose."""
-        q, v = np.zeros(self.layout.sizes[0]), np.zeros(self.layout.sizes[1])
-        for cluster in self._clusters:
-            balls = cluster.system.tree[cluster.system.tree['has_quaternion'] > 0]
-            q[cluster.q_indices[balls['q_start'][balls['parent'] >= 0] + 3]] = 1.0
-        for doll, placement in enumerate(self.scene.dolls):
-            pose = placement.bone_pose(placement.doll.root)
-            q[self.layout.root_positions[doll]] = pose.position
-            q[self.layout.root_orientations[doll]] = pose.orientation
-            v[self.layout.root_velocities[doll]] = placement.root_velocity()
-            v[self._spins[doll]] = placement.spin
-        return GeneralizedState(q, v)
 
     def _estimate_error(self) -> float:
         """Error, m, that the last interval added to the worst position.
