@@ -11,6 +11,8 @@ import sys
 import sysconfig
 from pathlib import Path
 
+import simulation_interfaces_types
+
 GENERATORS = [f'ros-jazzy-{name}' for name in (
     'ament-cmake', 'ament-cmake-gmock', 'ament-cmake-gtest', 'ament-cmake-include-directories',
     'ament-cmake-pytest', 'ament-cmake-ros', 'ament-package', 'common-interfaces',
@@ -18,17 +20,22 @@ GENERATORS = [f'ros-jazzy-{name}' for name in (
     'rosidl-core-generators', 'rosidl-default-generators', 'rosidl-generator-py')]
 TOOLS = ['catkin_pkg', 'cmake', 'empy<4', 'lark', 'ninja', 'numpy', 'setuptools<80']
 
-MESSAGES = {
-    'tf2_msgs': ('geometry_msgs', 'TFMessage', 'geometry_msgs/TransformStamped[] transforms'),
-    'hri_msgs': ('std_msgs', 'IdsList', 'std_msgs/Header header\nstring[] ids')}
-"""Of each package what it depends on, and its message that is used here."""
+PACKAGES = {
+    'tf2_msgs': (['geometry_msgs'], {
+        'msg/TFMessage.msg': 'geometry_msgs/TransformStamped[] transforms\n'}),
+    'hri_msgs': (['std_msgs'], {'msg/IdsList.msg': 'std_msgs/Header header\nstring[] ids\n'}),
+    'simulation_interfaces': (['action_msgs', 'geometry_msgs', 'std_msgs'],
+                              simulation_interfaces_types.VERSION_2),
+    'simulation_interfaces 1': (['action_msgs', 'geometry_msgs', 'std_msgs'],
+                                simulation_interfaces_types.VERSION_1)}
+"""Of each package what it depends on, and its types that are used here; a version may follow."""
 
 PACKAGE = """<package format="3">
-  <name>{name}</name> <version>0.36.0</version> <description>{message}</description>
+  <name>{name}</name> <version>0.36.0</version> <description>types</description>
   <maintainer email="tf2@example.org">nobody</maintainer> <license>BSD</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <buildtool_depend>rosidl_default_generators</buildtool_depend>
-  <depend>{needed}</depend>
+  {depends}
   <member_of_group>rosidl_interface_packages</member_of_group>
   <export><build_type>ament_cmake</build_type></export>
 </package>
@@ -37,9 +44,9 @@ PACKAGE = """<package format="3">
 CMAKE = """cmake_minimum_required(VERSION 3.20)
 project({name})
 find_package(ament_cmake REQUIRED)
-find_package({needed} REQUIRED)
+{finds}
 find_package(rosidl_default_generators REQUIRED)
-rosidl_generate_interfaces({name} msg/{message}.msg DEPENDENCIES {needed})
+rosidl_generate_interfaces({name} {files} DEPENDENCIES {needed})
 ament_package()
 """
 
@@ -57,11 +64,14 @@ def build(folder: Path, *names: str) -> dict[str, str]:
     python = tools / 'bin/python'
     for name in names:
         source, made = folder / name, folder / f'build_{name}'
-        needed, message, text = MESSAGES[name]
-        for path, content in ((f'msg/{message}.msg', f'{text}\n'), ('package.xml', PACKAGE),
-                              ('CMakeLists.txt', CMAKE)):
+        needed, types = PACKAGES[name]
+        fields = {'name': name.split()[0], 'needed': ' '.join(needed), 'files': ' '.join(types),
+                  'depends': ' '.join(f'<depend>{each}</depend>' for each in needed),
+                  'finds': '\n'.join(f'find_package({each} REQUIRED)' for each in needed)}
+        for path, content in (*types.items(), ('package.xml', PACKAGE.format(**fields)),
+                              ('CMakeLists.txt', CMAKE.format(**fields))):
             (source / path).parent.mkdir(parents=True, exist_ok=True)
-            (source / path).write_text(content.format(name=name, message=message, needed=needed))
+            (source / path).write_text(content)
         _run(tools / 'bin/cmake', '-S', source, '-B', made, '-G', 'Ninja',
              f'-DCMAKE_INSTALL_PREFIX={prefix}', '-DBUILD_TESTING=OFF',
              f'-DPython3_EXECUTABLE={python}', f'-DPYTHON_EXECUTABLE={python}', **places)
