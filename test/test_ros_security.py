@@ -4,6 +4,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from ragdoll_ros.ros.simulation_interfaces.entity_services import EntityServices
+from ragdoll_ros.ros.simulation_interfaces.servers import snake_case
+from ragdoll_ros.ros.simulation_interfaces.simulation_services import SimulationServices
+
 POLICY = Path(__file__).resolve().parent.parent / 'config' / 'ragdoll.policy.xml'
 
 
@@ -49,7 +53,8 @@ def given(ros):
     """What ROS knows of a node: names of what it publishes, hears, answers and asks."""
     def names(node):
         own = node.get_name(), node.get_namespace()
-        return [{name for name, _ in listed(*own)} for listed in (
+        # The policy names an action as a whole, not its topics and services.
+        return [{name for name, _ in listed(*own) if '/_action/' not in name} for listed in (
             node.get_publisher_names_and_types_by_node,
             node.get_subscriber_names_and_types_by_node,
             node.get_service_names_and_types_by_node, node.get_client_names_and_types_by_node)]
@@ -61,7 +66,10 @@ def test_the_policy_allows_what_the_node_does_and_no_more(make_node, given):
     publish, hear, answer, ask = given(node)
     assert publish | {'/tf'} == allowed('ragdoll', 'topics', 'publish')
     assert hear | {'/clock'} == allowed('ragdoll', 'topics', 'subscribe')  # use_sim_time's
-    assert answer == allowed('ragdoll', 'services', 'reply') and not ask
+    standard = {f'/ragdoll/{snake_case(name)}' for services in (SimulationServices, EntityServices)
+                for name in services.FEATURES}  # where simulation_interfaces is installed
+    assert answer | standard == allowed('ragdoll', 'services', 'reply') and not ask
+    assert allowed('ragdoll', 'actions', 'execute') == {'/ragdoll/simulate_steps'}
 
 
 def test_the_policy_allows_what_the_teleoperation_does_and_no_more(ros, given):

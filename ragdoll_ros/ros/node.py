@@ -36,6 +36,7 @@ from .process.rclpy_context import rclpy_context
 from .process.signals import run_uninterrupted, run_until_signal
 from .recovery import Recovery
 from .services import Services
+from .simulation_interfaces.servers import SimulationInterfaces
 from .stamps import Stamps
 from .ticker import QOS_EVENT_INTERVAL, SERVICE_INTERVAL, Ticker
 
@@ -84,6 +85,8 @@ class RagdollNode(Node):
         self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
                                         self._diagnostic_values, self._diagnostics_stamp)
         Services(self, self)
+        self.simulation_interfaces = SimulationInterfaces(self, self, self._steady,
+                                                          self._show_if_paused)
         self._duplicate_nodes = DuplicateNodes(self)
         self.recovery = Recovery(self)
         self.paused = False
@@ -116,8 +119,11 @@ class RagdollNode(Node):
 
     @property
     def waitables(self) -> Iterator[Waitable]:
-        """QoS events that an executor is to poll at this wake-up."""
-        return super().waitables if self._ticker.polls(QOS_EVENT_INTERVAL) else iter(())
+        """QoS events and actions that an executor is to poll at this wake-up."""
+        if self._ticker.polls(QOS_EVENT_INTERVAL):
+            return super().waitables
+        return iter(self.simulation_interfaces.actions
+                    if self._ticker.polls(SERVICE_INTERVAL) else ())
 
     def tick(self, due: float | None = None) -> None:
         """Make one tick and publish; a bad state is not published.
@@ -178,6 +184,8 @@ class RagdollNode(Node):
         for simulation in (getattr(self, 'simulation', None), getattr(self, '_prepared', None)):
             if simulation is not None:
                 simulation.close()
+        if hasattr(self, 'simulation_interfaces'):
+            self.simulation_interfaces.destroy()
         super().destroy_node()
 
     def _ros_time(self) -> int:
@@ -292,6 +300,7 @@ class RagdollNode(Node):
                 'stamp_pace': stamp_factor, 'namesakes': self._duplicate_nodes.count,
                 'unheard_cmd_vel': self.inputs.cmd_vel.unheard,
                 'humans': self._outputs.humans.status,
+                'simulation_interfaces': self.simulation_interfaces.status,
                 'stamp_of_zero': self.stamp - round(self.simulation.time / stamp_factor),
                 **self.recovery.diagnostics()}
 

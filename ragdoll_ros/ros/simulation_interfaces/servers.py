@@ -1,0 +1,109 @@
+"""Servers of the standard's services below the node's name, where simulation_interfaces is."""
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action import ActionServer
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock
+from rclpy.node import Node
+
+from ...model.errors import RagdollError
+from .codes import Code
+from .entity_services import EntityServices
+from .run_state import ControlledNode, RunState
+from .simulation_services import SimulationServices
+from .stepping import Stepper
+from .worlds import World
+
+try:
+    from simulation_interfaces import action, msg, srv
+except ImportError as error:  # not on PyPI, which has the rest of ROS
+    srv, MISSING = None, str(error)
+
+RESULT_TIMEOUT = 60
+"""s that the result of an action is kept for who asks."""
+
+QUIT_DELAY = 0.2
+"""s from the request to quit to the end of the node: the response is sent before."""
+
+
+class SimulationInterfaces:
+    """The servers on ``node``; ``controlled`` is the same node. ``after``: see EntityServices."""
+
+    def __init__(self, node: Node, controlled: ControlledNode, steady: Clock,
+                 after: Callable[[], None]) -> None:
+        self._node, self._controlled, self._steady = node, controlled, steady
+        self.actions: list[ActionServer] = []
+        self.status = ''
+        """For /diagnostics: how many services there are, or why there are none."""
+        if srv is None:
+            self.status = f'not served, as simulation_interfaces is not installed: {MISSING}'
+            return
+        run_state = RunState(controlled, self._shut_down)
+        simulation = SimulationServices(
+            run_state, Stepper(node, steady, controlled, run_state), msg, action,
+            node.set_parameters_atomically, self._world)
+        entities = EntityServices(controlled, msg, after)
+        # In a group of their own, as StepSimulation waits: others are served meanwhile.
+        self._group = ReentrantCallbackGroup()
+        for name, handler in (simulation.handlers | entities.handlers).items():
+            self._serve(name, handler)
+        self.actions.append(ActionServer(
+            node, action.SimulateSteps, '~/simulate_steps', simulation.simulate_steps,
+            callback_group=self._group, cancel_callback=simulation.accept_cancel,
+            result_timeout=RESULT_TIMEOUT))
+        simulation.features = features(simulation, entities)
+        self.status = f'{len(simulation.handlers | entities.handlers)} services, 1 action'
+
+    def destroy(self) -> None:
+        """Destroy the action's server, which the node does not."""
+        while self.actions:
+            self.actions.pop().destroy()
+
+    def _serve(self, name: str, handler: Callable) -> None:
+        """Create a service; what its handler raises becomes the result, and is counted."""
+        topic = f'~/{snake_case(name)}'
+
+        async def serve(request: Any, response: Any) -> Any:
+            refused = None
+            try:
+                waiting = handler(request, response)
+                if inspect.isawaitable(waiting):
+                    await waiting
+            except RagdollError as error:
+                refused = error
+                self._controlled.input_counts.refuse(topic, error)
+            if hasattr(response, 'result'):
+                response.result.result = int(Code.OK) if refused is None else getattr(
+                    refused, 'code', int(Code.OPERATION_FAILED))
+                response.result.error_message = (response.result.error_message
+                                                 if refused is None else str(refused))
+            return response
+
+        self._node.create_service(getattr(srv, name), topic, serve, callback_group=self._group)
+
+    def _world(self) -> World:
+        scene = self._controlled.simulation.scene
+        return World(scene.name, self._controlled.settings.scene, scene.description)
+
+    def _shut_down(self) -> None:
+        """End the process as a signal does, soon."""
+        self._node.get_logger().info('quitting, as ~/set_simulation_state asks')
+        self._node.create_timer(QUIT_DELAY, self._node.context.try_shutdown, clock=self._steady)
+
+
+def snake_case(name: str) -> str:
+    """GetEntities as get_entities."""
+    return re.sub('(?<=[a-z])(?=[A-Z])', '_', name).lower()
+
+
+def features(simulation: SimulationServices, entities: EntityServices) -> list[int]:
+    """Features of the services that are served, as numbers, ascending."""
+    served = {**simulation.FEATURES, **entities.FEATURES}
+    found = {feature for name in simulation.handlers | entities.handlers
+             for feature in served[name]}
+    return sorted({*found, *simulation.ACTION_FEATURES})

@@ -1,0 +1,117 @@
+"""Services on the simulation as a whole: features, state, reset, steps, worlds."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action import CancelResponse
+from rclpy.parameter import Parameter
+
+from .codes import Code, Feature, Refusal
+from .run_state import RunState
+from .stepping import Stepper
+from .worlds import RESOURCE_PARSE_ERROR, World, available, scene_of
+
+INFO = ('ragdoll_ros: docs/simulation_interfaces.md; entities are dolls, static bodies, and bones '
+        'as doll/bone; accelerations are not filled')
+
+
+class SimulationServices:
+    """Handlers, each ``(request, response)``, which raise Refusal.
+
+    ``messages``, ``actions``: the modules simulation_interfaces.msg and .action.
+    ``set_parameters``: the node's set_parameters_atomically. ``world()``: the current scene.
+    """
+
+    FEATURES = {
+        'GetSimulatorFeatures': (),
+        'GetSimulationState': (Feature.SIMULATION_STATE_GETTING,),
+        'SetSimulationState': (Feature.SIMULATION_STATE_SETTING, Feature.SIMULATION_STATE_PAUSE),
+        'ResetSimulation': (Feature.SIMULATION_RESET,),
+        'StepSimulation': (Feature.STEP_SIMULATION_SINGLE, Feature.STEP_SIMULATION_MULTIPLE),
+        'GetAvailableWorlds': (Feature.AVAILABLE_WORLDS,),
+        'LoadWorld': (Feature.WORLD_LOADING,),
+        'GetCurrentWorld': (Feature.WORLD_INFO_GETTING,)}
+    """What each service makes possible."""
+
+    ACTION_FEATURES = (Feature.STEP_SIMULATION_ACTION,)
+
+    def __init__(self, run_state: RunState, stepper: Stepper, messages: Any,
+                 actions: Any, set_parameters: Callable, world: Callable[[], World]) -> None:
+        self._run_state, self._stepper = run_state, stepper
+        self._messages, self._actions = messages, actions
+        self._set_parameters, self._world = set_parameters, world
+        self.features: list[int] = []
+        self.handlers = {
+            'GetSimulatorFeatures': self._get_features, 'GetSimulationState': self._get_state,
+            'SetSimulationState': self._set_state, 'ResetSimulation': self._reset,
+            'StepSimulation': self._step, 'GetAvailableWorlds': self._get_available_worlds,
+            'LoadWorld': self._load_world, 'GetCurrentWorld': self._get_current_world}
+
+    async def simulate_steps(self, goal: Any) -> Any:
+        """Execute the action's goal: feedback after each step; aborted or cancelled as refused."""
+        feedback, result = (self._actions.SimulateSteps.Feedback(),
+                            self._actions.SimulateSteps.Result())
+
+        def publish(made: int, left: int) -> None:
+            feedback.completed_steps, feedback.remaining_steps = made, left
+            goal.publish_feedback(feedback)
+
+        try:
+            await self._stepper.step(goal.request.steps, publish,
+                                     lambda: goal.is_cancel_requested)
+        except Refusal as refused:
+            result.result.result, result.result.error_message = refused.code, str(refused)
+            (goal.canceled if goal.is_cancel_requested else goal.abort)()
+        else:
+            result.result.result = int(Code.OK)
+            goal.succeed()
+        return result
+
+    @staticmethod
+    def accept_cancel(_: Any) -> CancelResponse:
+        """Every goal may be cancelled."""
+        return CancelResponse.ACCEPT
+
+    def _get_features(self, _: Any, response: Any) -> None:
+        response.features.features = self.features
+        response.features.custom_info = INFO
+
+    def _get_state(self, _: Any, response: Any) -> None:
+        response.state.state = int(self._run_state.state)
+
+    def _set_state(self, request: Any, _: Any) -> None:
+        self._run_state.set(request.state.state)
+
+    def _reset(self, request: Any, _: Any) -> None:
+        self._run_state.reset(request.scope)
+
+    async def _step(self, request: Any, _: Any) -> None:
+        await self._stepper.step(request.steps)
+
+    def _get_available_worlds(self, request: Any, response: Any) -> None:
+        if request.filter.tags:
+            raise Refusal(Code.FEATURE_UNSUPPORTED, 'filter.tags: worlds have no tags')
+        worlds, message = available(request.additional_sources, request.continue_on_error)
+        response.worlds = [self._fill(self._messages.WorldResource(), world) for world in worlds]
+        response.result.error_message = message
+
+    def _load_world(self, request: Any, response: Any) -> None:
+        """Version 2 has a Resource, version 1 its fields."""
+        resource = getattr(request, 'world_resource', request)
+        scene = scene_of(resource.uri, resource.resource_string)
+        done = self._set_parameters([Parameter('scene', value=scene)])
+        if not done.successful:
+            raise Refusal(RESOURCE_PARSE_ERROR, done.reason)
+        self._run_state.stop()
+        self._fill(response.world, self._world())
+
+    def _get_current_world(self, _: Any, response: Any) -> None:
+        self._fill(response.world, self._world())
+
+    @staticmethod
+    def _fill(resource: Any, world: World) -> Any:
+        """A WorldResource."""
+        resource.name, resource.description = world.name, world.description
+        resource.world_resource.uri = world.uri
+        return resource

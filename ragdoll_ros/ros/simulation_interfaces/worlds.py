@@ -1,0 +1,65 @@
+"""Worlds are scenes: those in config/, and any that the parameter `scene` takes."""
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+from urllib.parse import unquote, urlsplit
+
+import yaml
+
+from ...files.config import config_folder, find, scene_names
+from ...model.errors import RagdollError
+from .codes import Code, Refusal
+
+UNSUPPORTED_FORMAT, NO_RESOURCE, RESOURCE_PARSE_ERROR = 101, 102, 103
+"""Results of LoadWorld."""
+
+FORMATS = ('.yaml', '.yml')
+"""Ends of the names of scenes' files."""
+
+
+class World(NamedTuple):
+    """A scene: its name, what loads it, and a sentence on it."""
+
+    name: str
+    uri: str
+    description: str = ''
+
+
+def available(sources: Sequence[str], continue_on_error: bool) -> tuple[list[World], str]:
+    """The scenes in config/, and what to say about ``sources``, which are not searched.
+
+    Raises Refusal for sources, unless the search is to continue.
+    """
+    reason = ''
+    if sources:
+        reason = f'additional_sources: {len(sources)} not searched; expected none'
+        if not continue_on_error:
+            raise Refusal(Code.OPERATION_FAILED, reason)
+    return [World(name, name, _description(name)) for name in scene_names()], reason
+
+
+def scene_of(uri: str, text: str) -> str:
+    """Value of the parameter `scene` for a resource. Raises Refusal; says nothing of a file."""
+    if not uri:
+        raise (Refusal(Code.FEATURE_UNSUPPORTED, 'resource_string: expected a uri') if text else
+               Refusal(NO_RESOURCE, 'uri: expected a name in config/ or a path'))
+    parts = urlsplit(uri)
+    scene = unquote(parts.path) if parts.scheme == 'file' else uri
+    if not scene.lower().endswith(FORMATS) and re.search(r'\.\w+$', scene):
+        raise Refusal(UNSUPPORTED_FORMAT, f'uri: {uri[:60]!r}; expected a scene as YAML')
+    try:
+        find(scene)
+    except RagdollError as error:
+        raise Refusal(Code.NOT_FOUND, f'uri: {error}') from None
+    except ValueError:  # a null character
+        raise Refusal(Code.NOT_FOUND, f'uri: {uri[:60]!r}; expected a path') from None
+    return scene
+
+
+def _description(name: str) -> str:
+    """The description in a shipped scene's file, which is one line."""
+    text = (config_folder() / f'{name}.yaml').read_text()
+    line = re.search(r'^description: .*$', text, re.MULTILINE)
+    return str(yaml.safe_load(line[0])['description']) if line else ''

@@ -1,0 +1,192 @@
+"""The standard's services: what can be told without its messages; then with them, over DDS."""
+from __future__ import annotations
+
+import importlib.util
+import os
+import random
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from conftest import ROOT
+from message_packages import build
+from samples import random_coordinates
+from simulation_interfaces_types import VERSION_1, VERSION_2
+
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import shapes
+from ragdoll_ros.model.pose import Pose
+from ragdoll_ros.model.ragdoll import Bone, Ragdoll
+from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.ros.simulation_interfaces import servers
+from ragdoll_ros.ros.simulation_interfaces.bounds import Kind, Volume, bounding_box, own_box
+from ragdoll_ros.ros.simulation_interfaces.codes import Refusal
+from ragdoll_ros.ros.simulation_interfaces.entities import Category, Entities
+from ragdoll_ros.ros.simulation_interfaces.entity_services import EntityServices
+from ragdoll_ros.ros.simulation_interfaces.filters import Filters
+from ragdoll_ros.ros.simulation_interfaces.pattern import Pattern
+from ragdoll_ros.ros.simulation_interfaces.simulation_services import SimulationServices
+
+DOCS = (ROOT / 'docs/simulation_interfaces.md').read_text()
+
+
+def expression(chance, depth):
+    """A random expression that means the same to POSIX and to Python, but for captures."""
+    kinds = ['a', 'b', '.', '[ab]', '[^a]', '^', '$']
+    if depth and chance.random() < 0.7:
+        inner = [expression(chance, depth - 1) for _ in range(2)]
+        return chance.choice([f'{inner[0]}{inner[1]}', f'({inner[0]}|{inner[1]})',
+                              f'({inner[0]}){chance.choice(["*", "+", "?", "{1,2}", "{2}"])}'])
+    return chance.choice(kinds)
+
+
+def test_expressions_match_as_in_grep():
+    """Python's re finds a match if there is one, as POSIX does; which one is no question here."""
+    chance = random.Random(5)
+    texts = ['', 'a', 'b', 'ab', 'ba', 'aab', 'abba', 'cab', 'bbbb']
+    for _ in range(300):
+        text = expression(chance, 3)
+        ours, theirs = Pattern(text), re.compile(text)
+        for each in texts:
+            assert ours.is_in(each) == bool(theirs.search(each)), (text, each)
+    for text, inside, outside in (('[[:digit:]]{2,}', 'doll_10', 'doll_1'), ('[]x]', 'a]', 'a['),
+                                  ('\\.', 'a.b', 'ab'), ('^doll_(1|2)$', 'doll_2', 'doll_21'),
+                                  ('[a-c-]', '-', 'd')):
+        assert Pattern(text).is_in(inside) and not Pattern(text).is_in(outside)
+
+
+@pytest.mark.parametrize('wrong', [
+    '(', ')', '*a', '+', 'a{', 'a{2,1}', 'a{999}', '[', '[a', '[[:x:]]', '\\', 'a|*', 'a' * 201,
+    '(' * 60 + ')' * 60])
+def test_an_expression_that_is_none_is_refused(wrong):
+    with pytest.raises(Refusal, match='filter'):
+        Pattern(wrong)
+
+
+def test_no_expression_takes_long():
+    """Those on which a matcher that tries one after the other takes years."""
+    begin = time.process_time()
+    for text in ('((((.+)+)+)+)+~', '(.|.)*(.|.)*~', '(((.{0,255}){0,255}){0,255}){255}~',
+                 '.*' * 90 + '~', '(.?){255}' * 20 + '~'):
+        try:
+            assert not Pattern(text).is_in('a' * 300)
+        except Refusal as refused:
+            assert 'takes too long' in str(refused)
+    assert time.process_time() - begin < 20  # each a quarter of a second; a busy machine
+
+
+@pytest.fixture(scope='module')
+def stairs():
+    """A man and eleven stairs, in a random posture."""
+    scene = load_scene('stairs')
+    with Simulation(scene) as simulation:
+        simulation.place(random_coordinates(scene, 3))
+        yield simulation
+
+
+def selected(simulation, **filters):
+    return [entity.name for entity in Filters(**filters).select(
+        Entities(simulation.scene), simulation.scene, simulation.state)]
+
+
+def test_entities_have_the_category_of_what_they_are(stairs):
+    entities = Entities(stairs.scene)
+    kinds = {entity.name: entities.info(entity).category for entity in entities}
+    assert kinds.pop('man') == Category.HUMAN
+    assert set(kinds.values()) == {Category.STATIC_OBJECT} and len(kinds) == 11
+    for name in ('drop', 'woman', 'article', 'character'):
+        assert next(iter(Entities(load_scene(name)))).info.category == Category.HUMAN
+    ball = Bone('ball', shapes.Sphere(0.1), 1.0, (0, 0, 0))
+    alone = Scene('one', (Placement(Ragdoll('ball', (ball,), ())),))
+    assert next(iter(Entities(alone))).info.category == Category.OBJECT
+    assert entities.find('man/head').root == stairs.scene.bone_index('head')
+    with pytest.raises(Refusal, match=r"'man/tail'; expected one of man, .*, or doll/bone"):
+        entities.find('man/tail')
+
+
+def test_a_sphere_selects_what_it_reaches(stairs):
+    """By the distance of each bone's mesh from its centre; round shapes are a little larger."""
+    scene, state = stairs.scene, stairs.state
+    man = np.concatenate([state.poses(index).apply(bone.shape.mesh()[0])
+                          for index, bone in enumerate(scene.bones)])
+    far = man.mean(axis=0) + np.array([0, 0, 3])
+    near = np.linalg.norm(man - far, axis=1).min()
+    for radius, reached in ((near + 1e-3, True), (near - 0.05, False)):
+        volume = Volume.of(Kind.SPHERE, [far, (radius, 0, 0)])
+        assert ('man' in selected(stairs, volume=volume)) == reached
+
+
+def test_a_box_selects_what_its_boxes_meet(stairs):
+    head = stairs.scene.bone_index('head')
+    lower, upper = own_box(Entities(stairs.scene).find('man/head'), stairs.scene, stairs.state)
+    assert (upper - lower > 0.1).all()
+    centre = stairs.state.positions[head]
+    assert 'man' in selected(stairs, volume=Volume.of(Kind.BOX, [centre, centre]))
+    high = [(9, 9, 99), (-9, -9, 90)]
+    assert selected(stairs, volume=Volume.of(Kind.BOX, high)) == []
+    everything = Volume.of(Kind.BOX, [(-99, -99, -99), (99, 99, 99)])
+    assert selected(stairs, volume=everything) == selected(stairs)
+    assert selected(stairs, volume=everything, name='^man$', categories=[2]) == ['man']
+
+
+@pytest.mark.parametrize(('kind', 'points'), [
+    (Kind.CONVEX_HULL, [(0, 0, 0)] * 4), (7, []), (Kind.BOX, [(0, 0, 0)]),
+    (Kind.SPHERE, [(0, 0, 0), (-1, 0, 0)]), (Kind.SPHERE, [(0, 0, np.nan), (1, 0, 0)])])
+def test_a_volume_that_is_none_is_refused(kind, points):
+    with pytest.raises(Refusal, match='bounds'):
+        Volume.of(kind, points)
+    assert Volume.of(Kind.EMPTY, points) is None
+
+
+def test_the_box_of_a_turned_shape_is_tight():
+    """A rod of .1 by 1 m at 45 degrees about y: half (1 + .1) / sqrt 2 along x and z."""
+    turn = Pose(np.array([1.0, 2, 3]), np.array([0, np.sin(np.pi / 8), 0, np.cos(np.pi / 8)]))
+    lower, upper = bounding_box([(shapes.Box((0.1, 0.2, 1)), turn)])
+    half, centre = np.array([1.1 / 8 ** 0.5, 0.1, 1.1 / 8 ** 0.5]), np.array([1, 2, 3])
+    np.testing.assert_allclose([lower, upper], [centre - half, centre + half], atol=1e-12)
+
+
+@pytest.mark.skipif(servers.srv is not None, reason='simulation_interfaces is installed')
+def test_a_node_without_the_package_says_what_is_missing(make_node):
+    node = make_node()
+    assert "No module named 'simulation_interfaces'" in node.simulation_interfaces.status
+    assert not [name for name, _ in node.get_service_names_and_types() if 'simulation' in name]
+
+
+def test_the_lines_of_the_documentation_have_the_fields_of_the_services():
+    """And its table has all services."""
+    lines = re.findall(r"^ros2 (?:service call|action send_goal --feedback) /ragdoll/(\w+) "
+                       r"simulation_interfaces/(srv|action)/(\w+)(?: '(.*)')?$", DOCS, re.MULTILINE)
+    assert len(lines) == DOCS.count('ros2 service call') + DOCS.count('ros2 action')
+    for topic, kind, name, text in lines:
+        assert topic == servers.snake_case(name)
+        fields = yaml.safe_load(text or '{}')
+        request = VERSION_2[f'{kind}/{name}.{kind}'].split('---')[0]
+        assert set(fields) <= set(re.findall(r'^\S+ (\w+)', request, re.MULTILINE)), name
+    served = {*SimulationServices.FEATURES, *EntityServices.FEATURES}
+    assert set(re.findall(r'`([a-z_]+)`', ' '.join(
+        line.split('|')[1] for line in DOCS.splitlines() if line.startswith('| `')))) >= {
+            servers.snake_case(name) for name in served} | {'simulate_steps'}
+    assert {f'srv/{name}.srv' for name in served} <= set(VERSION_1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('package', ['simulation_interfaces', 'simulation_interfaces 1'])
+def test_services_with_the_messages_of_both_versions(tmp_path, package):
+    """In a process of its own, with messages that are built for it or installed."""
+    places = {} if importlib.util.find_spec('simulation_interfaces') else build(tmp_path, package)
+    environment = {**os.environ, **{
+        name: os.pathsep.join(filter(None, [path, str(ROOT) if name == 'PYTHONPATH' else '',
+                                            os.environ.get(name)]))
+        for name, path in places.items()}}
+    done = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider',
+         str(Path(__file__).with_name('simulation_interfaces_served.py'))],
+        env=environment, cwd=ROOT, capture_output=True, text=True, timeout=900)
+    assert done.returncode == 0, done.stdout + done.stderr
