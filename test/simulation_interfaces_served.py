@@ -7,6 +7,7 @@ Run by test_ros_simulation_interfaces.py, which builds the messages where they a
 from __future__ import annotations
 
 import math
+import random
 import re
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pytest
 import yaml
 from conftest import ROOT
 from geometry_msgs.msg import PoseArray, Vector3
+from peer import start
 from rclpy.action import ActionClient
 from simulation_interfaces import action, msg, srv
 from std_srvs.srv import SetBool, Trigger
@@ -384,3 +386,56 @@ def test_the_lines_of_the_documentation_are_served(node, peer, call):
             assert (got[2], got[7]) == (3, pytest.approx(1))
             assert rotation.angle_between(np.array(got[3:7]), np.array([0, 0, 0, 1])) < 1e-9
     assert not node.paused
+
+
+def rubbish(chance, kind):
+    """A value of a field's type that may be anything."""
+    if kind.startswith('sequence<'):
+        return [rubbish(chance, kind[9:-1]) for _ in range(chance.randrange(4))]
+    if kind in ('double', 'float'):
+        return chance.choice([0.0, 1.0, -1e300, math.nan, math.inf, 1e-300, chance.gauss(0, 5)])
+    if kind == 'boolean':
+        return chance.random() < 0.5
+    if kind == 'string':
+        return chance.choice(['', 'man', 'man/head', 'step_1', 'world', 'drop', '/etc/passwd', '((',
+                              '[', 'x' * 5000, '\u2603', 'http://[', 'file://', '/', '\\', '.*'])
+    if kind.startswith('uint'):
+        return min(chance.choice([0, 1, 2, 4, 7, 100, 255]), 255)
+    if kind.startswith('int'):
+        return chance.choice([-1, 0, 1])
+    package, name = kind.split('/')
+    made = getattr(__import__(f'{package}.msg', fromlist=[name]), name)()
+    for field, inner in made.get_fields_and_field_types().items():
+        setattr(made, field, rubbish(chance, inner))
+    return made
+
+
+def test_nothing_that_is_called_harms_the_node(node, peer):
+    """Every service but the one that quits, with anything in every field; states stay finite."""
+    chance = random.Random(7)
+    names = [name for name in dir(srv) if name[0].isupper()
+             and f'/ragdoll/{snake_case(name)}' in dict(node.get_service_names_and_types())]
+    assert len(names) == 15
+    for count in range(450):
+        name = names[count % 15]
+        request = getattr(srv, name).Request()
+        for field, kind in request.get_fields_and_field_types().items():
+            setattr(request, field, rubbish(chance, kind))
+        if name != 'SetSimulationState' or request.state.state != 3:
+            peer.call(getattr(srv, name), f'/ragdoll/{snake_case(name)}', request)
+    node.pause(True)
+    before = node.simulation.time
+    response = peer.call(srv.StepSimulation, '/ragdoll/step_simulation',
+                         srv.StepSimulation.Request())
+    assert code(response) == 1
+    assert node.simulation.time == before + node.simulation.tick
+    assert np.isfinite(node.simulation.state.rows).all()
+
+
+def test_quitting_ends_the_process_with_0(peer):
+    process = start('node', '--ros-args', '-r', '__ns:=/other')
+    request = srv.SetSimulationState.Request()
+    request.state.state = msg.SimulationState.STATE_QUITTING
+    assert code(peer.call(srv.SetSimulationState, '/other/ragdoll/set_simulation_state',
+                          request)) == 1
+    assert process.wait(30) == 0

@@ -21,8 +21,8 @@ MAX_DEPTH = 40
 MAX_REPEATS = 255
 """RE_DUP_MAX of POSIX: largest number in braces."""
 
-MAX_WORK = 200_000
-"""Characters that a match may look at: a tenth of a second."""
+MAX_WORK = 1_000_000
+"""Characters that the matches of one expression may look at."""
 
 CLASSES = {
     'alpha': str.isalpha, 'digit': str.isdecimal, 'alnum': str.isalnum, 'upper': str.isupper,
@@ -37,16 +37,14 @@ Part = Callable[['Text', Places], Places]
 
 
 class Text:
-    """A text that is matched, and how much work that may take."""
+    """A text that is matched; ``spend(count)`` counts the work."""
 
-    def __init__(self, text: str) -> None:
-        self.text, self._left = text, MAX_WORK
+    def __init__(self, text: str, spend: Callable[[int], None]) -> None:
+        self.text, self.spend = text, spend
 
     def after(self, accepts: Callable[[str], bool], places: Places) -> Places:
         """Places after one accepted character."""
-        self._left -= len(places) + 1
-        if self._left < 0:
-            raise Refusal(Code.OPERATION_FAILED, 'filter: the expression takes too long')
+        self.spend(len(places))
         return frozenset(place + 1 for place in places
                          if place < len(self.text) and accepts(self.text[place]))
 
@@ -58,11 +56,18 @@ class Pattern:
         if len(expression) > MAX_LENGTH:
             raise Refusal(Code.OPERATION_FAILED, f'filter: {len(expression)} characters; '
                           f'expected at most {MAX_LENGTH}')
-        self._part = _Parser(expression).parse()
+        self._part, self._left = _Parser(expression).parse(), MAX_WORK
 
     def is_in(self, text: str) -> bool:
-        """Whether some part of the text matches, as with grep -E."""
-        return bool(self._part(Text(text), frozenset(range(len(text) + 1))))
+        """Whether some part of the text matches, as with grep -E. Raises Refusal if this and all
+        matches before take too long.
+        """
+        return bool(self._part(Text(text, self._spend), frozenset(range(len(text) + 1))))
+
+    def _spend(self, count: int) -> None:
+        self._left -= count
+        if self._left < 0:
+            raise Refusal(Code.OPERATION_FAILED, 'filter: the expression takes too long')
 
 
 class _Parser:
@@ -91,6 +96,7 @@ class _Parser:
 
         def match(text: Text, places: Places) -> Places:
             for part in parts:
+                text.spend(1)
                 places = part(text, places)
                 if not places:
                     break

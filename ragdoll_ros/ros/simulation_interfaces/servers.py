@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rclpy.action import ActionServer
@@ -50,14 +50,16 @@ class SimulationInterfaces:
         entities = EntityServices(controlled, msg, after)
         # In a group of their own, as StepSimulation waits: others are served meanwhile.
         self._group = ReentrantCallbackGroup()
-        for name, handler in (simulation.handlers | entities.handlers).items():
+        served = {name: handler for name, handler in {
+            **simulation.handlers, **entities.handlers}.items() if hasattr(srv, name)}
+        for name, handler in served.items():
             self._serve(name, handler)
         self.actions.append(ActionServer(
             node, action.SimulateSteps, '~/simulate_steps', simulation.simulate_steps,
             callback_group=self._group, cancel_callback=simulation.accept_cancel,
             result_timeout=RESULT_TIMEOUT))
-        simulation.features = features(simulation, entities)
-        self.status = f'{len(simulation.handlers | entities.handlers)} services, 1 action'
+        simulation.features = features(served)
+        self.status = f'{len(served)} services, 1 action'
 
     def destroy(self) -> None:
         """Destroy the action's server, which the node does not."""
@@ -101,9 +103,8 @@ def snake_case(name: str) -> str:
     return re.sub('(?<=[a-z])(?=[A-Z])', '_', name).lower()
 
 
-def features(simulation: SimulationServices, entities: EntityServices) -> list[int]:
-    """Features of the services that are served, as numbers, ascending."""
-    served = {**simulation.FEATURES, **entities.FEATURES}
-    found = {feature for name in simulation.handlers | entities.handlers
-             for feature in served[name]}
-    return sorted({*found, *simulation.ACTION_FEATURES})
+def features(served: Iterable[str]) -> list[int]:
+    """Features of the action and of the services that are served, as numbers, ascending."""
+    possible = {**SimulationServices.FEATURES, **EntityServices.FEATURES}
+    return sorted({*SimulationServices.ACTION_FEATURES,
+                   *(feature for name in served for feature in possible[name])})

@@ -4,7 +4,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from typing import NamedTuple
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 import yaml
 
@@ -45,8 +45,7 @@ def scene_of(uri: str, text: str) -> str:
     if not uri:
         raise (Refusal(Code.FEATURE_UNSUPPORTED, 'resource_string: expected a uri') if text else
                Refusal(NO_RESOURCE, 'uri: expected a name in config/ or a path'))
-    parts = urlsplit(uri)
-    scene = unquote(parts.path) if parts.scheme == 'file' else uri
+    scene = unquote(uri.removeprefix('file://')) if uri.startswith('file:///') else uri
     if not scene.lower().endswith(FORMATS) and re.search(r'\.\w+$', scene):
         raise Refusal(UNSUPPORTED_FORMAT, f'uri: {uri[:60]!r}; expected a scene as YAML')
     try:
