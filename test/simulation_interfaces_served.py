@@ -126,7 +126,8 @@ def test_features_are_those_of_the_services_that_there_are(node, call):
         'get_entity_bounds': {'ENTITY_BOUNDS'}, 'get_entity_state': {'ENTITY_STATE_GETTING'},
         'get_entities_states': {'ENTITY_STATE_GETTING'},
         'set_entity_state': {'ENTITY_STATE_SETTING'}, 'get_entity_info': {'ENTITY_INFO_GETTING'},
-        'set_entity_info': {'ENTITY_INFO_SETTING'}, 'reset_simulation': {'SIMULATION_RESET'},
+        'set_entity_info': {'ENTITY_INFO_SETTING'}, 'reset_simulation': {'SIMULATION_RESET',
+                                                                      'SIMULATION_RESET_STATE'},
         'get_simulation_state': {'SIMULATION_STATE_GETTING'},
         'set_simulation_state': {'SIMULATION_STATE_SETTING', 'SIMULATION_STATE_PAUSE'},
         'step_simulation': {'STEP_SIMULATION_SINGLE', 'STEP_SIMULATION_MULTIPLE'},
@@ -222,16 +223,19 @@ def test_the_action_gives_feedback_after_each_step_and_is_cancelled(node, peer, 
     client.destroy()
 
 
-def test_a_reset_is_of_time_and_state_together(node, call):
-    start = node.simulation.state.rows.tobytes()
-    for scope in (0, 255, 3, 7):
+def test_a_reset_is_of_the_state_with_time_or_without(node, call):
+    start, tick = node.simulation.state.rows.tobytes(), node.simulation.tick
+    for scope, kept in ((0, 0), (255, 0), (3, 0), (7, 0), (2, 3), (6, 3)):
+        call('ResetSimulation')
         call('StepSimulation', steps=3)
         assert code(call('ResetSimulation', scope=scope)) == 1
-        assert node.simulation.time == 0 and node.simulation.state.rows.tobytes() == start
+        assert node.simulation.time == kept * tick
+        assert node.simulation.state.rows.tobytes() == start
     call('StepSimulation')
-    for scope in (1, 2, 4, 8, 128):
+    before = node.simulation.state.rows.tobytes()
+    for scope in (1, 4, 5, 8, 10, 128):
         assert code(call('ResetSimulation', scope=scope)) == 0
-    assert node.simulation.time > 0
+    assert node.simulation.state.rows.tobytes() == before != start
 
 
 def test_entities_are_the_dolls_and_bodies_that_pass_all_filters(node, call):

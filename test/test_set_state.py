@@ -149,14 +149,17 @@ def test_events_repeat_it_to_the_bit():
                 simulation.set_state('ball', (0, 5, 1), velocity=(0, -12, 1))
             if tick == 50:
                 simulation.set_state('doll1', orientation=(1, 0, 0, 1))
+            if tick == 70:
+                simulation.reset(keep_time=True)
             simulation.advance()
-        assert [entry[1] for entry in log] == ['set_state', 'set_state']
+        assert [entry[1] for entry in log] == ['set_state', 'set_state', 'reset']
         for tick in range(100):
             for at, name, arguments in log:
                 if at == tick:
                     apply_event(twin, name, arguments)
             twin.advance()
         assert state_digest(twin.state) == state_digest(simulation.state)
+        assert twin.time == simulation.time == 100 * simulation.tick
 
 
 @pytest.mark.parametrize(('given', 'error', 'text'), [

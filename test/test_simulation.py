@@ -121,12 +121,15 @@ def test_a_reset_goes_back_to_the_bit_however_dolls_are_turned(name):
         placement, orientation=tuple(rng.normal(size=4)), spin=tuple(rng.normal(size=3)))
         for placement in scene.dolls)
     with Simulation(dataclasses.replace(scene, dolls=turned)) as simulation:
-        runs = []
-        for _ in range(3):
+        runs, times = [], []
+        for keep_time in (False, True, False):
             runs.append(np.array([simulation.state.rows, *(
                 simulation.advance().rows for _ in range(60))]))
-            simulation.reset()
+            simulation.push(Push(scene.bone_names[0], force=(100, 0, 0), duration=9))
+            simulation.reset(keep_time)
+            times.append(simulation.time)
     assert (runs[0] == runs[1]).all() and (runs[1] == runs[2]).all()
+    assert times == [0, 60 * simulation.tick, 0]
 
 
 def make_and_drop(count):

@@ -105,9 +105,9 @@ class LoggedSimulation(Simulation):
             key: list(map(float, values)) for key, values in given.items() if values is not None}})
         return state
 
-    def reset(self) -> State:
-        state = super().reset()
-        self.on_event('reset', self.conditions)
+    def reset(self, keep_time: bool = False) -> State:
+        state = super().reset(keep_time)
+        self.on_event('reset', {**self.conditions, **({'keep_time': True} if keep_time else {})})
         return state
 
     def go_back(self, checkpoint: tuple[int, object]) -> State:
@@ -153,5 +153,5 @@ _ACTIONS: dict[str, Callable[..., object]] = {
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),
     'place': lambda simulation, q, v: simulation.place(GeneralizedState(np.array(q), np.array(v))),
     'go_back': lambda simulation: simulation.go_back(simulation.checkpoint()),
-    # The fields of 'reset' are the conditions, for readers that start there.
-    'reset': lambda simulation, **_: simulation.reset()}
+    # The other fields of 'reset' are the conditions, for readers that start there.
+    'reset': lambda simulation, keep_time=False, **_: simulation.reset(keep_time)}

@@ -448,15 +448,19 @@ class Simulation:
             self._swings.reset(self.time, self.state)
         return self.state
 
-    def reset(self) -> State:
+    def reset(self, keep_time: bool = False) -> State:
         """Restore and return the initial state, to the bit; ends all pushes, grabs and springs.
+
+        Args:
+            keep_time: whether simulated time continues; else it is 0 again.
 
         >>> simulation.reset().positions.shape, simulation.time
         ((10, 3), 0)
         """
         self.reset_count += 1
         self._engine.restore(self._start)
-        self.time = 0
+        if not keep_time:
+            self.time = 0
         self.substates = (self.state,)
         self._pushes = PushQueue(self.scene)
         self._hands, self._joint_springs = Hands(self.scene), JointSprings(self.scene)

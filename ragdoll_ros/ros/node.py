@@ -145,9 +145,9 @@ class RagdollNode(Node):
         lag = 0.0 if due is None else start - due
         self._diagnostics.record_tick(time.monotonic_ns() - start, lag, self.simulation.tick)
 
-    def reset(self) -> None:
+    def reset(self, keep_time: bool = False) -> None:
         """Reset the simulation, bit-identically to its start, and publish its state."""
-        self.simulation.reset()
+        self.simulation.reset(keep_time)
         self._publish_start()
 
     def pause(self, paused: bool) -> None:

@@ -18,8 +18,8 @@ class Controlled(Protocol):
     paused: bool
     input_counts: InputCounts
 
-    def reset(self) -> None:
-        """Reset to the start."""
+    def reset(self, keep_time: bool = False) -> None:
+        """Reset to the start; ``keep_time``: simulated time continues."""
 
     def tick(self) -> None:
         """Make one tick."""

@@ -16,8 +16,8 @@ from .codes import Code, Refusal
 ALREADY_IN_TARGET_STATE, INCORRECT_TRANSITION = 101, 103
 """Results of SetSimulationState."""
 
-TIME, STATE, ALL = 1, 2, 255
-"""Scopes of a reset; 0 is ALL."""
+TIME, STATE, SPAWNED, ALL = 1, 2, 4, 255
+"""Scopes of a reset, bits but for ALL; 0 is ALL as well."""
 
 
 class RunningState(IntEnum):
@@ -91,11 +91,15 @@ class RunState:
         self._stopped = self.run
 
     def reset(self, scope: int) -> None:
-        """Reset the simulation; it goes on as before. Raises Refusal for a part of it alone."""
-        if scope not in (0, ALL) and (scope & (TIME | STATE) != TIME | STATE or scope > 7):
-            raise Refusal(Code.FEATURE_UNSUPPORTED, f'scope: {scope}; expected 0 or 255 (all), or '
-                          '3 (time and state): neither is reset without the other')
+        """Reset the state, and time unless the scope leaves it out; then go on as before.
+
+        Nothing is ever spawned. Raises Refusal for a scope without the state.
+        """
+        scope = scope or ALL
+        if not scope & STATE or (scope > TIME | STATE | SPAWNED and scope != ALL):
+            raise Refusal(Code.FEATURE_UNSUPPORTED, f'scope: {scope}; expected 0 or 255 (all), '
+                          '3 (time and state) or 2 (state)')
         was_stopped = self.state == RunningState.STOPPED
-        self._controlled.reset()
+        self._controlled.reset(keep_time=not scope & TIME)
         if was_stopped:
             self._stopped = self.run

@@ -27,7 +27,7 @@ class SimulationServices:
         'GetSimulatorFeatures': (),
         'GetSimulationState': (Feature.SIMULATION_STATE_GETTING,),
         'SetSimulationState': (Feature.SIMULATION_STATE_SETTING, Feature.SIMULATION_STATE_PAUSE),
-        'ResetSimulation': (Feature.SIMULATION_RESET,),
+        'ResetSimulation': (Feature.SIMULATION_RESET, Feature.SIMULATION_RESET_STATE),
         'StepSimulation': (Feature.STEP_SIMULATION_SINGLE, Feature.STEP_SIMULATION_MULTIPLE),
         'GetAvailableWorlds': (Feature.AVAILABLE_WORLDS,),
         'LoadWorld': (Feature.WORLD_LOADING,),
