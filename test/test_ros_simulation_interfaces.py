@@ -162,7 +162,7 @@ def test_a_node_without_the_package_says_what_is_missing(make_node):
 
 
 def test_the_lines_of_the_documentation_have_the_fields_of_the_services():
-    """And its table has all services."""
+    """And its table has all services and features."""
     lines = re.findall(r"^ros2 (?:service call|action send_goal --feedback) /ragdoll/(\w+) "
                        r"simulation_interfaces/(srv|action)/(\w+)(?: '(.*)')?$", DOCS, re.MULTILINE)
     assert len(lines) == DOCS.count('ros2 service call') + DOCS.count('ros2 action')
@@ -172,9 +172,11 @@ def test_the_lines_of_the_documentation_have_the_fields_of_the_services():
         request = VERSION_2[f'{kind}/{name}.{kind}'].split('---')[0]
         assert set(fields) <= set(re.findall(r'^\S+ (\w+)', request, re.MULTILINE)), name
     served = {*SimulationServices.FEATURES, *EntityServices.FEATURES}
-    assert set(re.findall(r'`([a-z_]+)`', ' '.join(
-        line.split('|')[1] for line in DOCS.splitlines() if line.startswith('| `')))) >= {
-            servers.snake_case(name) for name in served} | {'simulate_steps'}
+    rows = [line.split('|') for line in DOCS.split('```sh')[0].splitlines() if line[:3] == '| `']
+    assert {name for row in rows for name in re.findall(r'`([a-z_]+)`', row[1])} == {
+        servers.snake_case(name) for name in served} | {'simulate_steps'}
+    assert sorted({int(number) for row in rows for number in re.findall(r'\d+', row[2])}) == (
+        servers.features(served))
     assert {f'srv/{name}.srv' for name in served} <= set(VERSION_1)
 
 
