@@ -85,7 +85,7 @@ def replayed(capsys, *arguments):
 
 
 def test_a_run_with_all_that_can_act_is_repeated_to_the_bit(make_node, peer, log, tmp_path, capsys):
-    node = make_node()
+    node = make_node(start_paused=True)  # only the loop makes ticks, also while a scene is loaded
     peer.wait_heard(node, EVENTS, SCENE)
     digests = {}
     for tick in range(1, 401):
