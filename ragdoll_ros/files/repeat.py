@@ -47,7 +47,7 @@ def _yawed(first: Placement | StaticBody, place: np.ndarray,
     through its centre of mass or origin; before, its frame is at ``place``.
     """
     turn = rotation.from_axis_angle((0.0, 0.0, 1.0), angle)
-    center = first.doll.mass_centre if isinstance(first, Placement) else np.zeros(3)
+    center = first.mass_centre if isinstance(first, Placement) else np.zeros(3)
     arm = rotation.rotate(first.orientation, center)
     orientation = rotation.normalized(rotation.multiply(turn, np.array(first.orientation)))
     return place + arm - rotation.rotate(turn, arm), tuple(orientation.tolist())

@@ -121,14 +121,9 @@ class DofLayout:
     def with_joint_rates(self, coordinates: GeneralizedState, rates: np.ndarray) -> np.ndarray:
         """A copy of the velocities v with joint rates (k,) rad/s: the inverse of joint_rates()."""
         v = coordinates.v.copy()
-        free = np.ones(len(rates), bool)
+        v[self._rates] = rates
         for own, at, spin in self._free_angles:
-            free[own] = False
-            angles = rotation.to_euler_xyz(coordinates.q[at])
-            # Linear in the spin: a column for each of its components.
-            v[spin] = np.linalg.solve(np.transpose([
-                rotation.euler_xyz_rates(angles, unit) for unit in np.eye(3)]), rates[own])
-        v[self._rates[free]] = rates[free]
+            v[spin] = rotation.euler_xyz_spin(rotation.to_euler_xyz(coordinates.q[at]), rates[own])
         return v
 
     def joint_rates(self, coordinates: GeneralizedState) -> np.ndarray:

@@ -205,6 +205,17 @@ def euler_xyz_rates(angles: ArrayLike, spin: ArrayLike) -> np.ndarray:
                      spin[2] - first_rate * math.sin(second)])
 
 
+def euler_xyz_spin(angles: ArrayLike, rates: ArrayLike) -> np.ndarray:
+    """Angular velocity (3,) rad/s in body axes at the ``rates`` (3,) rad/s of intrinsic Euler
+    angles: the inverse of euler_xyz_rates.
+    """
+    _, second, third = angles
+    sin, cos = math.sin(third), math.cos(third)
+    first_rate = rates[0] * math.cos(second)
+    return np.array([first_rate * cos + rates[1] * sin, rates[1] * cos - first_rate * sin,
+                     rates[2] + rates[0] * math.sin(second)])
+
+
 def angle_between(a: ArrayLike, b: ArrayLike) -> np.ndarray:
     """Geodesic distance of unit quaternions in rad, 0 to pi; q and -q are the same rotation."""
     difference = multiply(inverse(a), b)

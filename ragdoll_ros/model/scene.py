@@ -138,17 +138,23 @@ class Placement:
         here = self._motions[bone.name].pose(bone) if self.angles else bone.pose
         return Pose(np.array(self.position), np.array(self.orientation)).compose(here)
 
+    @property
+    def mass_centre(self) -> np.ndarray:
+        """Initial centre of mass (3,) m, doll's frame."""
+        return self._mean('position') if self.angles else self.doll.mass_centre
+
     def root_velocity(self) -> np.ndarray:
         """Initial velocity (3,) m/s of the root's centre of mass, world frame."""
-        centre, drift = self.doll.mass_centre, np.zeros(3)
-        if self.angles or self.rates:
-            shares = np.array([bone.mass / self.doll.mass for bone in self.doll.bones])
-            motions = [self._motions[bone.name] for bone in self.doll.bones]
-            centre = shares @ [motion.position for motion in motions]
-            drift = rotation.rotate(self.orientation, shares @ [
-                motion.velocity for motion in motions])
-        arm = rotation.rotate(self.orientation, self.doll.root.position - centre)
-        return self.velocity + np.cross(self.spin, arm) - drift
+        arm = rotation.rotate(self.orientation, self.doll.root.position - self.mass_centre)
+        moved = self.velocity + np.cross(self.spin, arm)
+        if self.rates:
+            moved -= rotation.rotate(self.orientation, self._mean('velocity'))
+        return moved
+
+    def _mean(self, key: str) -> np.ndarray:
+        """Mean of a field of the bones' motions, weighted by their masses."""
+        return np.average([getattr(self._motions[bone.name], key) for bone in self.doll.bones],
+                          axis=0, weights=[bone.mass for bone in self.doll.bones])
 
     @cached_property
     def _motions(self) -> dict[str, BoneMotion]:

@@ -61,9 +61,9 @@ def posed(placement: Placement, angles: dict[str, float] | None = None,
     q, v = tree.bind(placement.position, placement.orientation), np.zeros(tree.nv)
     v[:3], v[3:6] = placement.root_velocity(), placement.spin
     where = angle_indices(doll)
-    for name, angle in (angles or {}).items():
+    for name, angle in {**placement.angles, **(angles or {})}.items():
         q[7 + where[name]] = angle
-    for name, rate in (rates or {}).items():
+    for name, rate in {**placement.rates, **(rates or {})}.items():
         v[6 + where[name]] = rate
     return GeneralizedState(q, v)
 
