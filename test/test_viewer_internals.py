@@ -49,6 +49,10 @@ def test_private_names_of_the_server_exist(server):
         wait(server.get_clients)
         (client_id, client), = server.get_clients().items()
         assert hasattr(viser_internals.connections(client)[client_id], 'ping')
+        with viser_internals.sent_at_once(server):
+            server.scene.add_frame('/f')
+            before = page.windows
+        wait(lambda: page.windows > before)
     finally:
         page.close()
 

@@ -29,6 +29,7 @@ from .sources.source import Frame, RequestedData, Source, SourceStatus
 from .start_when_visible import StartWhenVisible
 from .timeline.timeline import Timeline
 from .timeline.transport import Transport
+from .viser_internals import sent_at_once
 from .widgets.form import GREY, RED, colored
 
 PERIOD = 1 / 60
@@ -130,29 +131,34 @@ class Page:
         is_open = bool(clients)
         self.source.request(self.display.requested if is_open else RequestedData())
         self.controls.pushes.update(time.monotonic())
-        frame = self.source.frame if is_open else None
+        start = self.start_when_visible
+        waits = start is not None and not start.is_done
+        frame = self.source.frame if is_open and waits else None
         if is_open:
-            was_editing = self.editor is not None and self.editor.editing
-            frames, status = self.source.take_frames(), self.source.status
-            start, now = self.start_when_visible, time.monotonic()
-            for new in frames:
-                if start is None or not start.hides(new):
-                    self._keep(new, status, now)
-            if self._live is not None:
-                self._show(self._live, status, now)
-            if self.stage is not None:
-                self.stage.set_visible(bones=self.display.bones.value,
-                                       skins=self.display.skin.value)
-                self.stage.set_dark(self.display.dark.value)
-            if self.editor is not None:
-                self.editor.update_paused(status.paused, was_editing)
-            if self.gallery is not None:
-                self.gallery.show(self._live and self._live.scene, self.controls.loading)
-            self._show_messages(status.problem, status.note)
-            self.controls.show(status)
-        if self.start_when_visible is not None:
-            self.start_when_visible.update(clients, frame, time.monotonic())
+            with sent_at_once(self.server):
+                self._update_pages(time.monotonic())
+        if waits:
+            start.update(clients, frame, time.monotonic())
         return is_open
+
+    def _update_pages(self, now: float) -> None:
+        """Draw what has changed at ``now`` s of a steady clock."""
+        was_editing = self.editor is not None and self.editor.editing
+        frames, status = self.source.take_frames(), self.source.status
+        for new in frames:
+            if self.start_when_visible is None or not self.start_when_visible.hides(new):
+                self._keep(new, status, now)
+        if self._live is not None:
+            self._show(self._live, status, now)
+        if self.stage is not None:
+            self.stage.set_visible(bones=self.display.bones.value, skins=self.display.skin.value)
+            self.stage.set_dark(self.display.dark.value)
+        if self.editor is not None:
+            self.editor.update_paused(status.paused, was_editing)
+        if self.gallery is not None:
+            self.gallery.show(self._live and self._live.scene, self.controls.loading)
+        self._show_messages(status.problem, status.note)
+        self.controls.show(status)
 
     def _keep(self, frame: Frame, status: SourceStatus, now: float) -> None:
         """Keep a new frame of the source for recordings, timeline and plots."""
@@ -212,11 +218,8 @@ class Page:
             self.display.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
         self.frame = frame
-        with self.server.atomic():
-            self.stage.show(frame if self._has_contacts else replace(
-                frame, contacts=None, forces=None, pairs=None))
-        # Without it viser collects messages for up to 1/60 s.
-        self.server.flush()
+        self.stage.show(frame if self._has_contacts else replace(
+            frame, contacts=None, forces=None, pairs=None))
 
     def _edit(self, scene: Scene) -> None:
         """Pass the scene to the editor, which is created for the first one."""

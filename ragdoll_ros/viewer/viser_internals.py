@@ -5,7 +5,8 @@ pass with the new version: it checks that each name below exists there.
 """
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import viser
@@ -31,6 +32,32 @@ def handle_id(handle: viser.GuiInputHandle) -> str:
 def run_script(client: viser.ClientHandle, source: str) -> None:
     """Run JavaScript on a page, whether its panel is open or not."""
     client._websock_connection.queue_message(_messages.RunJavascriptMessage(source))
+
+
+@contextmanager
+def sent_at_once(server: viser.ViserServer) -> Iterator[None]:
+    """Send to all pages, at once and together, what is changed within.
+
+    ViserServer.atomic and flush wake viser's thread once each, also where nothing has changed: a
+    system call and a change of threads. Without flush it collects messages for up to 1/60 s.
+    """
+    buffer = server._websock_server.get_message_buffer()
+    before = buffer.message_counter
+    buffer.atomic_start()
+    try:
+        yield
+    finally:
+        with buffer.buffer_lock:
+            buffer.atomic_counter -= 1
+            has_changed = buffer.atomic_counter == 0 and buffer.message_counter != before
+        if has_changed:
+            with suppress(RuntimeError):  # the server has stopped
+                buffer.event_loop.call_soon_threadsafe(_wake, buffer)
+
+
+def _wake(buffer: Any) -> None:
+    buffer.message_event.set()
+    buffer.flush_event.set()
 
 
 def connections(client: viser.ClientHandle) -> Mapping[int, Any]:
