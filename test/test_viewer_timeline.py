@@ -286,6 +286,7 @@ def test_plots_follow_the_timeline():
     """They end where one looks, and begin anew with a reset."""
     with served(SimulationSource(DROP)) as page:
         client = page.open()
+        client.tell(page.plots.events, 'seen')
         ends = lambda: page.plots.gap.handle.data[0][-1]  # noqa: E731
         wait(lambda: len(page.plots.gap.handle.data[0]) > 6)
         client.steer(page, 'position 0.8')
@@ -301,6 +302,7 @@ def test_plots_begin_anew_with_another_scene():
     with served(SimulationSource(DROP)) as page:
         client = page.open()
         plots = page.plots
+        client.tell(plots.events, 'seen')
         handles = [plot.handle for plot in (plots.energy, plots.gap, plots.real_time_factor)]
         wait(lambda: min(handle.data[0][-1:].sum() for handle in handles) > 2)
         client.update(page.controls.scene, 'flight')
@@ -316,6 +318,7 @@ def test_plots_begin_anew_with_a_recording(recording):
     """Played a second time, it is plotted as the first."""
     with served(PlaybackSource(recording)) as page:
         client, gap = page.open(), page.plots.gap.handle
+        client.tell(page.plots.events, 'seen')
         wait(lambda: gap.data[0][-1:].sum() > 0.9)
         client.press(page, 'Reset')
         wait(lambda: 0 < gap.data[0][-1] < 0.9)

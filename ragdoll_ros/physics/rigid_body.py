@@ -4,6 +4,7 @@ import math
 import numpy as np
 
 from ..model import rotation
+from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Scene
 from ..model.shapes import support_distance
@@ -102,5 +103,10 @@ class JointGap:
 
     def gaps(self, state: State) -> np.ndarray:
         """Distances (j,) m between anchors, in the dolls' order of joints."""
-        seen = state.poses(self._bones).apply(self._points)
-        return np.linalg.norm(seen[:, 0] - seen[:, 1], axis=-1)
+        return self.of_rows(state.rows)
+
+    def of_rows(self, rows: np.ndarray) -> np.ndarray:
+        """As `gaps`, (k, j) m, of k states; ``rows`` (k, n, 13) as State.rows."""
+        poses = rows[..., self._bones, :7]
+        seen = Pose(poses[..., :3], poses[..., 3:]).apply(self._points)
+        return np.linalg.norm(seen[..., 0, :] - seen[..., 1, :], axis=-1)

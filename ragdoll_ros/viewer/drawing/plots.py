@@ -9,6 +9,7 @@ import viser
 from viser import uplot
 
 from ...physics.rigid_body import JointGap
+from ..browser.scripts import add_listener
 from ..sources.source import Frame, SourceStatus
 
 PERIOD = 0.25
@@ -31,7 +32,10 @@ PADDING = (10, 16, 0, 26)
 
 
 class Plots:
-    """Three plots over simulated time."""
+    """Three plots over simulated time, in the GUI container that is current.
+
+    They are drawn and sent while a page has them in view.
+    """
 
     def __init__(self, server: viser.ViserServer) -> None:
         self.energy = _Plot(server, 'Energy since the start, J', (
@@ -39,10 +43,28 @@ class Plots:
         self.gap = _Plot(server, 'Joint gap, µm', (('largest', 'darkorange'),))
         self.real_time_factor = _Plot(server, 'Real-time factor', (
             ('measured', 'seagreen'), ('requested', 'silver')))
+        self.events = add_listener(server.gui, 'plots', 'plots.js', self._take)
+        self._seen_by: set[int] = set()
+        """Pages that have them in view."""
+        self._new: list[tuple[float, Frame]] = []
+        """Frames whose joint gap is not computed yet, with their instants: one at a time takes
+        four times as long."""
         self._last: Frame | None = None
         self._measured = (0.0, 0.0)
         """Simulated and wall time, s, since which the real-time factor is measured."""
         self._instant = self._next = 0.0
+
+        @server.on_client_disconnect
+        def _(client: viser.ClientHandle) -> None:
+            self._seen_by.discard(client.client_id)
+
+    def _take(self, page: int, text: str) -> None:
+        """Take note of whether a page has the plots in view; of viser's thread."""
+        if text == 'seen':
+            self._seen_by.add(page)
+            self._next = 0.0
+        else:
+            self._seen_by.discard(page)
 
     def add(self, frame: Frame, instant: float, status: SourceStatus, now: float) -> None:
         """Add points for a frame at an ``instant`` of the timeline, s.
@@ -56,9 +78,7 @@ class Plots:
             self._begin(frame, instant, now)
         self._last, self._instant = frame, instant
         self._measure(frame, instant, status, now)
-        # Less than a nanometre is rounding, which would fill the plot.
-        gap = 1e6 * self._gaps.gaps(frame.state).max(initial=0.0)
-        self.gap.add(instant, frame.time, round(float(gap), 3))
+        self._new.append((instant, frame))
         self.energy.add(instant, frame.time, frame.energy, frame.work)
 
     def _measure(self, frame: Frame, instant: float, status: SourceStatus, now: float) -> None:
@@ -78,11 +98,26 @@ class Plots:
         if now < self._next:
             return
         self._next = now + PERIOD
+        self._add_gaps()
+        if not self._seen_by:
+            return
         for plot in (self.energy, self.gap, self.real_time_factor):
             plot.show(instant)
 
+    def _add_gaps(self) -> None:
+        """Compute the joint gap of the new frames."""
+        if not self._new:
+            return
+        rows = np.stack([frame.state.rows for _, frame in self._new])
+        # Less than a nanometre is rounding, which would fill the plot.
+        gaps = np.round(1e6 * self._gaps.of_rows(rows).max(axis=1, initial=0.0), 3).tolist()
+        for (instant, frame), gap in zip(self._new, gaps, strict=True):
+            self.gap.add(instant, frame.time, gap)
+        self._new.clear()
+
     def _begin(self, frame: Frame, instant: float, now: float) -> None:
         """Begin a run of plots, of another scene if that is another one."""
+        self._add_gaps()
         is_new_scene = self._last is None or frame.scene is not self._last.scene
         clear = is_new_scene or instant < self._instant
         if is_new_scene:
