@@ -67,6 +67,8 @@ class Page:
         """The scene that is shown; None before the first frame."""
         self.start_when_visible: StartWhenVisible | None = None
         self._live: Frame | None = None
+        self._messages: tuple[str, ...] = ()
+        """A problem, or '', and notes that are shown."""
         self._has_contacts = False
         """Whether contacts are drawn."""
         self._next_look = 0.0
@@ -218,8 +220,9 @@ class Page:
             self.display.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
         self.frame = frame
-        self.stage.show(frame if self._has_contacts else replace(
-            frame, contacts=None, forces=None, pairs=None))
+        if not self._has_contacts and frame.contacts is not None:
+            frame = replace(frame, contacts=None, forces=None, pairs=None)
+        self.stage.show(frame)
 
     def _edit(self, scene: Scene) -> None:
         """Pass the scene to the editor, which is created for the first one."""
@@ -238,9 +241,11 @@ class Page:
             self.source.pause(False)
 
     def _show_messages(self, problem: str, note: str) -> None:
-        notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]
-        self.problem.content = colored(problem, RED) + ''.join(colored(each, GREY)
-                                                                for each in notes)
+        messages = problem, note, *(self.stage.skins.notes if self.stage is not None else ())
+        if messages != self._messages:
+            self._messages = messages
+            self.problem.content = colored(problem, RED) + ''.join(
+                colored(each, GREY) for each in messages[1:])
 
 
 def hint(text: str, key: str) -> str:

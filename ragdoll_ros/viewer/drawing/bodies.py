@@ -17,6 +17,7 @@ from ...model.ragdoll import DEFAULT_COLOR
 from ...model.scene import Scene
 from ...model.shapes import Part
 from ...model.state import State
+from ..viser_internals import set_poses
 from .joint_balls import joint_balls
 from .meshes import COARSE, MESHES
 
@@ -96,9 +97,7 @@ class Bodies:
     def show(self, state: State) -> None:
         """Draw a state."""
         for batch in (*self.batches, *self._balls):
-            positions, wxyzs = _part_poses(state, batch.bones, batch.local_pose)
-            batch.handle.batched_positions = positions
-            batch.handle.batched_wxyzs = wxyzs
+            set_poses(batch.handle, *_part_poses(state, batch.bones, batch.local_pose))
 
     def set_visible(self, visible: bool, translucent: bool) -> None:
         """Show or hide the bones below skins; others stay visible."""

@@ -12,7 +12,7 @@ from ..sources.source import Frame
 from .framing import bounding_spheres, box_center, home_position, sees_all
 
 PERIOD = 1 / 30
-"""s between two moves."""
+"""s between two moves of a camera, and of the node of the pushed doll."""
 
 INITIAL_CAMERA = ((3.2, -0.9, 1.3), (0.0, 0.0, 0.7))
 """Position and target before the first frame, m: from the front, a little aside."""
@@ -102,21 +102,24 @@ class Cameras:
     def follow(self, frame: Frame, bone: int, now: float, follow: bool) -> None:
         """Follow the doll of a bone at ``now`` s of a steady clock, or return to former views."""
         self._bone = bone
-        if np.abs(self._center(frame) - self._doll.position).max() > TOLERANCE:
-            self._doll.position = self._center(frame)
+        is_due = now >= self._next_move
+        if is_due:
+            self._next_move = now + PERIOD
+            center = self._center(frame)
+            if np.abs(center - self._doll.position).max() > TOLERANCE:
+                self._doll.position = center
         if not follow and self._node is not None:
             self._node.remove()
             self._node = None
             for client_id, client in self._server.get_clients().items():
                 if client_id in self._before_follow:
                     self._move(client, *self._before_follow.pop(client_id))
-        elif follow and now >= self._next_move and not frame.grabs:
-            self._next_move = now + PERIOD
+        elif follow and is_due and not frame.grabs:
             if self._node is None:
                 self._before_follow = {client_id: (client.camera.position, client.camera.look_at)
                               for client_id, client in self._server.get_clients().items()}
                 self._node = self._server.scene.add_frame(FOLLOWED_NODE, show_axes=False)
-            self._node.position = self._center(frame)
+            self._node.position = center
 
     def _center(self, frame: Frame) -> np.ndarray:
         """Centre of mass (3,) m of the pushed doll, world frame."""

@@ -58,6 +58,8 @@ class PushKeys:
                                         initial_value=TOP_SPEED, visible=can_push,
                                         hint='That a held key brings the doll to')
         self._effect = gui.add_html('', visible=can_push)
+        self._shown_effect: tuple = ()
+        """What the text of `_effect` depends on."""
         self.strength.on_update(lambda _: self._show_effect())
         buttons.on_click(lambda event: self.tap(event.client, ARROWS[event.target.value]))
         for arrow in ARROWS.values() if can_push else ():
@@ -158,13 +160,14 @@ class PushKeys:
 
     def _show_effect(self) -> None:
         """State the pushed bone and what a tap does."""
-        if self._scene is None:
+        shown = self._scene, self.bone, self.strength.value
+        if self._scene is None or shown == self._shown_effect:
             return
+        self._shown_effect = shown
         text = (f'Pushes {self._scene.bone_names[self.bone]}. A click chooses another bone.'
                 f'<br>A tap gives {self._mass():.3g} kg '
                 f'{self.strength.value * TAP / self._mass():.2g} m/s in the air.')
         if self._scene.ground is not None and math.isinf(self._scene.material.friction):
             text += ' Friction is unlimited: what lies on the ground does not slide.'
-        content = f'<div style="font-size: 0.85em; padding: 0 1em 0.4em">{text}</div>'
-        if content != self._effect.content:
-            self._effect.content = content
+        self._effect.content = (
+            f'<div style="font-size: 0.85em; padding: 0 1em 0.4em">{text}</div>')

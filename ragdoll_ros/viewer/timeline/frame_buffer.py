@@ -4,6 +4,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -121,10 +122,8 @@ class FrameBuffer:
     def clip(self) -> Clip:
         """The frames that are kept now, at least one; later frames do not change the clip."""
         frames = tuple(self._frames)
-        return Clip(np.array([entry.time for entry in frames]),
-                    lambda index: frames[index].frame,
-                    *(np.array([getattr(entry, key) for entry in frames])
-                      for key in ('pushed', 'touching', 'resets')))
+        return Clip(_column(frames, 'time', float), lambda index: frames[index].frame,
+                    *(_column(frames, key, bool) for key in ('pushed', 'touching', 'resets')))
 
     def _touches(self, frame: Frame, time: float, before: bool) -> bool:
         """Whether a bone touches the ground; tested at intervals, as it is slow for a crowd."""
@@ -146,6 +145,10 @@ class FrameBuffer:
         limit = min(MAX_FRAMES, max(2, MAX_NUMBERS // numbers))
         while len(frames) > limit or frames[-1].time - frames[0].time > SPAN:
             frames.popleft()
+
+
+def _column(frames: tuple[TimelineFrame, ...], key: str, kind: type) -> np.ndarray:
+    return np.fromiter(map(attrgetter(key), frames), kind, len(frames))
 
 
 def clip_of(recording: Recording, frame_at: Callable[[float], Frame]) -> Clip:

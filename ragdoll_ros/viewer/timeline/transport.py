@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import viser
 
@@ -147,7 +147,7 @@ class Transport:
 
     def _send(self) -> None:
         """Send to each page what it does not show yet."""
-        values = asdict(self.shown)
+        values = vars(self.shown)
         for page, client in self._server.get_clients().items():
             sent = self._sent.setdefault(page, {})
             changes = {key: value for key, value in values.items() if sent.get(key) != value}
