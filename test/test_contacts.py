@@ -16,6 +16,7 @@ from ragdoll_ros import (
     load_scene,
 )
 from ragdoll_ros.model import rotation
+from ragdoll_ros.model.errors import WrongForm
 from ragdoll_ros.model.scene import Material
 from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.physics.engine.protocol import GROUND
@@ -106,6 +107,52 @@ def test_friction_is_in_the_wrench_of_what_slides(engine):
     assert (x, y) == pytest.approx((-0.3 * z, 0), abs=0.01 * z)
     if engine == 'rigid':
         assert np.array(each)[:, 2] == pytest.approx(MASS * G, rel=1e-4)
+
+
+@pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
+def test_a_bounce_is_in_the_impulses(accuracy):
+    """A ball that bounces on a table: in a tick m (v' - v - g t), which of a bounce is m (v- + v+),
+    with v- = sqrt(2 g h) and v+ = e v-. At rest, m g a second.
+    """
+    pytest.importorskip('numba')
+    height, restitution = 0.5, 0.5
+    scene = Scene('bounce', (Placement(BALL, 'ball', (0, 0, height + EDGE / 2)),),
+                  material=Material(restitution=restitution),
+                  bodies=(StaticBody('table', Box((1, 1, 1)), (0, 0, -0.5)),))
+    with Simulation(scene, accuracy=accuracy) as simulation:
+        speeds, impulses = [0.0], [0.0]
+        for _ in range(250):
+            speeds.append(simulation.advance().linear_velocities[0, 2])
+            impulses.append(simulation.contact_impulses[0, 2])
+            if simulation.asleep:
+                break
+        simulation.reset()
+        assert not simulation.contact_impulses.any()
+    given = np.diff(impulses)
+    assert given == pytest.approx(MASS * (np.diff(speeds) + G * 0.01), abs=1e-8)
+    first = given[given > 0][0]
+    assert first == pytest.approx(MASS * (1 + restitution) * (2 * G * height) ** 0.5, rel=1e-8)
+    assert given[-2] == pytest.approx(MASS * G * 0.01, rel=1e-6)
+
+
+def test_dolls_that_hit_each_other_get_opposite_impulses():
+    """Two balls in the air: 1 kg m/s is handed over; a third, on its own, gets nothing."""
+    pytest.importorskip('numba')
+    scene = Scene('shot', (
+        Placement(BALL, 'one', (0, 0, 0), velocity=(1, 0, 0)), Placement(BALL, 'two', (0.3, 0, 0)),
+        Placement(BALL, 'far', (9, 0, 0))), material=Material(restitution=0), gravity=(0, 0, 0))
+    with Simulation(scene) as simulation:
+        simulation.run(20)
+        assert simulation.contact_impulses == pytest.approx(
+            np.array([(-MASS / 2, 0, 0), (MASS / 2, 0, 0), (0, 0, 0)]), abs=1e-8)
+
+
+@pytest.mark.parametrize('engine', ['bullet', 'mujoco'])
+def test_other_engines_say_that_they_count_no_impulses(engine):
+    pytest.importorskip({'bullet': 'pybullet'}.get(engine, engine))
+    with (Simulation(load_scene('drop'), engine=engine) as simulation,
+          pytest.raises(WrongForm, match='rigid')):
+        _ = simulation.contact_impulses
 
 
 def test_what_sleeps_on_each_other_goes_on_touching_while_others_move():

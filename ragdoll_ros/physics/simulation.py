@@ -210,6 +210,16 @@ class Simulation:
         return self._engine.contacts()
 
     @property
+    def contact_impulses(self) -> np.ndarray:
+        """Impulse (n, 3) N s of all contacts on each bone since the start, those of impacts
+        included, world frame; the same while it sleeps. Raises WrongForm: the engine is not rigid.
+        """
+        impulses = self._engine.contact_impulses
+        if impulses is None:
+            raise errors.WrongForm('engine', self.engine_name, 'rigid, which counts impulses')
+        return impulses.copy()
+
+    @property
     def bones_on_ground(self) -> np.ndarray:
         """Which bones (n,) touch the ground; cheaper than ``contacts``."""
         return self._engine.bones_on_ground()

@@ -235,6 +235,10 @@ class Engine(Protocol):
     def contacts(self) -> Contacts:
         """All contact points."""
 
+    @property
+    def contact_impulses(self) -> np.ndarray | None:
+        """Impulse (n, 3) N s of contacts on each bone since the start; None: not counted."""
+
     def bones_on_ground(self) -> np.ndarray:
         """Which bones (n,) touch the ground."""
 

@@ -79,13 +79,14 @@ of them, in which flight steps reached their bound. ``ledger``: see above."""
 
 ClusterState = collections.namedtuple(
     'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '
-    'contact_accelerations bone_states doll_sums loads springs')
+    'contact_accelerations bone_states doll_sums contact_impulses loads springs')
 """The state of a cluster. ``q`` (nq,), ``v`` (nv,): generalized coordinates and velocities, angular
 velocities of roots along the roots' own axes. ``dense_step`` (1,), with its polynomial
 ``dense_output`` (8, nq + nv) and the state derivatives at its ends, ``end_rates`` (2, nq + nv).
 ``stats`` (1,). ``excluded`` (p,): flags of the pairs within dolls, see system.py. ``contacts``: of
 the last step. ``gaps``: see contact/gaps.py. ``contact_accelerations`` (nv,): by contacts in the
-last step, zero unless all of them persist. Output: ``bone_states`` (n, 13), ``doll_sums`` (d,).
+last step, zero unless all of them persist. Output: ``bone_states`` (n, 13), ``doll_sums`` (d,), and
+``contact_impulses`` (n, 3) N s: of contacts on each bone since the start, world frame.
 Input: ``loads``, ``springs``."""
 
 
@@ -98,7 +99,8 @@ def make_cluster_state(system: System, contacts: int = 0) -> ClusterState:
         stats=np.zeros(1, STEP_STATS), excluded=np.zeros(len(system.pairs), np.int64),
         contacts=np.zeros(contacts, CONTACT), gaps=np.zeros(gap_count(system)),
         contact_accelerations=np.zeros(nv), bone_states=np.zeros((len(system.tree), 13)),
-        doll_sums=np.zeros(len(system.doll_masses), DOLL_SUMS), loads=np.zeros(0, LOAD),
+        doll_sums=np.zeros(len(system.doll_masses), DOLL_SUMS),
+        contact_impulses=np.zeros((len(system.tree), 3)), loads=np.zeros(0, LOAD),
         springs=np.zeros(0, SPRING))
 
 

@@ -29,7 +29,7 @@ SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'conta
                 'flights_cut')
 """Statistics that are summed over clusters."""
 
-CHECKPOINT = ('q', 'v', 'excluded', 'stats')
+CHECKPOINT = ('q', 'v', 'excluded', 'contact_impulses', 'stats')
 """Fields of the states that a checkpoint stores; all others are computed from them."""
 
 PARTS_PER_THREAD = 4
@@ -87,6 +87,7 @@ class Clusters:
         whole = self._states.arrays
         self.q, self.v, self.bone_states = whole['q'], whole['v'], whole['bone_states'].reshape(
             -1, 13)
+        self.contact_impulses = whole['contact_impulses'].reshape(-1, 3)
         self.sum_rows = whole['doll_sums'].view(float).reshape(-1, 20)
         """(d, 20): the sums as DollTotals has them."""
         self.sums, self.stats = whole['doll_sums'], whole['stats']
@@ -390,6 +391,7 @@ class Clusters:
             left -= window
         # Not invalidated before it is advanced itself: an island shares its statistics.
         cluster.state.bone_states[:] = self.bone_states[cluster.bones]
+        cluster.state.contact_impulses[:] = self.contact_impulses[cluster.bones]
         cluster.state.doll_sums[:] = self.sums[cluster.dolls]
         cluster.state.excluded[:] = np.concatenate(self._excluded(cluster))
         cluster.islands = list(made.values())
@@ -416,6 +418,7 @@ class Clusters:
         """Copy the state of a cluster of several dolls into the scene's arrays."""
         self.q[cluster.q_indices], self.v[cluster.v_indices] = cluster.state.q, cluster.state.v
         self.bone_states[cluster.bones] = cluster.state.bone_states
+        self.contact_impulses[cluster.bones] = cluster.state.contact_impulses
         self.sums[cluster.dolls] = cluster.state.doll_sums
         at = 0
         for excluded in self._excluded(cluster):
@@ -454,7 +457,8 @@ class Clusters:
         system = join_systems(systems, make_pairs(geom_pairs, laws),
                               self.static_geoms.geoms[static_geoms])
         state = make_cluster_state(system, contact_capacity(system))._replace(
-            q=self.q[q], v=self.v[v], stats=self.stats[dolls[0]:dolls[0] + 1],
+            q=self.q[q], v=self.v[v], contact_impulses=self.contact_impulses[bones],
+            stats=self.stats[dolls[0]:dolls[0] + 1],
             excluded=np.concatenate([self._singles[doll].state.excluded for doll in dolls]))
         return _bind_cluster(dolls, pairs, keys, bones, q, v, system, state,
                              [make_workspace(system, state)])

@@ -2,6 +2,7 @@
 import numpy as np
 
 from ...kernels.contact_kind import LIMIT
+from ...rigid_body import cross
 from ..protocol import GROUND
 
 
@@ -27,6 +28,6 @@ def contact_wrenches(contacts: np.ndarray, dt: np.ndarray) -> np.ndarray:
     """
     impulse = contacts['impulse'] / dt[:, None]
     friction = np.einsum('ck,ckx->cx', impulse[:, 1:3], contacts['tangents'])
-    torque = np.cross(contacts['friction_point'] - contacts['point'], friction)
+    torque = cross(contacts['friction_point'] - contacts['point'], friction)
     torque += np.einsum('ck,ckx->cx', impulse[:, 3:], contacts['tangents'])
     return np.concatenate([impulse[:, :1] * contacts['normal'] + friction, torque], axis=1)

@@ -87,7 +87,7 @@ class RigidEngine:
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:] = coordinates.q
         v[:] = self._in_root_axes(coordinates)
-        clusters.stats[:] = 0
+        clusters.stats[:] = clusters.contact_impulses[:] = 0
         clusters.separate()
         self.sleeping[:] = False
         self._refresh()
@@ -164,6 +164,10 @@ class RigidEngine:
         found, touching, dt = self._clusters.contacts()
         return Contacts(*touching.T, found['point'], found['normal'], -found['gap'],
                         found['impulse'][:, 0] / dt, contact_wrenches(found, dt))
+
+    @property
+    def contact_impulses(self) -> np.ndarray:
+        return self._clusters.contact_impulses
 
     def bones_on_ground(self) -> np.ndarray:
         return self._clusters.on_ground()

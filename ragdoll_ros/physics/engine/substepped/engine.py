@@ -138,6 +138,10 @@ class SubsteppedEngine(ABC):
         """Whether any doll touches the ground, (d,): the dolls are one cluster."""
         return np.full(len(self.sleeping), any(GROUND in pair for pair in self._touching_pairs()))
 
+    @property
+    def contact_impulses(self) -> None:
+        return None
+
     def bones_on_ground(self) -> np.ndarray:
         contacts, on = self.contacts(), np.zeros(len(self.scene.bones), bool)
         on[contacts.a[contacts.b == GROUND]] = True

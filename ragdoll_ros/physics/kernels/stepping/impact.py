@@ -16,6 +16,7 @@ from ..dynamics.mass_matrix import factor_ltl, mass_matrix
 from ..impulses.solve_contacts import solve_contacts
 from ..system import System
 from ..workspace import Workspace
+from .momentum import count_contact_impulses
 
 TOLERANCE = 1e-10
 """m/s: tolerance of the contact solve."""
@@ -74,5 +75,6 @@ def impact(s: System, ws: Workspace, cluster: ClusterState) -> int:
     solve_contacts(s, ws, kin, q, v, v, m, 0.0, TOLERANCE)
     for j in range(len(v)):
         v[j] += ws.step.v_change[j]
+    count_contact_impulses(s, ws, m, cluster.contact_impulses)
     ws.stats[0].impacts += 1
     return touching - m

@@ -120,6 +120,22 @@ def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
 
 
 @compiled
+def count_contact_impulses(s: System, ws: Workspace, m: int, impulses: np.ndarray) -> None:
+    """Add the impulses of m contacts to those on their bones, ``impulses`` (n, 3) N s."""
+    for n in range(m):
+        c = ws.contacts.found[n]
+        if c.kind == LIMIT:
+            continue
+        p, t, w = c.impulse, vec(c.tangents[0]), vec(c.tangents[1])
+        impulse = add(scale(p[0], vec(c.normal)), add(scale(p[1], t), scale(p[2], w)))
+        bone = impulses[s.tree[c.body_a].bone]
+        put(bone, add(vec(bone), impulse))
+        if c.body_b >= 0:
+            bone = impulses[s.tree[c.body_b].bone]
+            put(bone, sub(vec(bone), impulse))
+
+
+@compiled
 def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.ndarray) -> None:
     """Change q and v at the end of a step of h s, where the sums are step.sums_after, so that each
     doll that is not on the ground has the momentum and center of mass that its external impulses

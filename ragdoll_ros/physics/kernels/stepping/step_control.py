@@ -14,7 +14,8 @@ from ..dynamics.kinematics import integrate_positions
 from ..system import System
 from ..workspace import Workspace
 from .contact_step import MAX_PENETRATION, STEP_TOLERANCE, contact_step, finish_step
-from .momentum import REMOVABLE, internal_kinetic_energy, remove_energy, total_energy
+from .momentum import (REMOVABLE, count_contact_impulses, internal_kinetic_energy, remove_energy,
+                       total_energy)
 from .position_correction import PAID_SHARE
 from .time_of_impact import (OVERSHOT, impacts_at_end, is_fast_impact, next_trial_step,
                              open_bracket, step_to_joint_limit, update_bracket)
@@ -126,6 +127,7 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             stats.energy_removed += removed
             stats.energy_unremoved += gained - removed
         break
+    count_contact_impulses(s, ws, m, cluster.contact_impulses)
     accept_step(ws, cluster, m, length, length > 0.1 * h)
     return length, hit
 
