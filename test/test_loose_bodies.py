@@ -108,3 +108,9 @@ def test_what_is_wrong_with_a_loose_body_is_named(tmp_path, entry, told):
     with pytest.raises(ValueError) as error:
         scene(tmp_path, entry)
     assert told in str(error.value)
+
+
+def test_the_bench_of_the_scene_table_is_knocked_over():
+    with Simulation(load_scene('table')) as simulation:
+        row = simulation.run(200)[-1, -1]
+    assert row[2] == pytest.approx(0.15, abs=1e-4), 'it lies on its side, 0.3 m wide'
