@@ -200,7 +200,7 @@ def test_the_arrows_of_a_doll_at_rest_bear_its_weight():
     low = contacts.b == GROUND
     frame = Frame(scene, 0.0, state, contacts=contacts.positions[low],
                   forces=(contacts.normals * contacts.forces[:, None])[low],
-                  pairs=np.stack([contacts.a, contacts.b], axis=1)[low])
+                  pairs=np.stack([contacts.a, contacts.b, contacts.bodies], axis=1)[low])
     arrows, newtons = force_arrows(frame)
     doll = scene.dolls[0].doll
     weight = doll.mass * -scene.gravity[2]
@@ -211,6 +211,16 @@ def test_the_arrows_of_a_doll_at_rest_bear_its_weight():
     assert np.linalg.norm(along, axis=1) == pytest.approx(newtons / (9.8 * doll.mass))
     assert abs(arrows[:, 0, 2]).max() < 0.001
     assert (np.diff(newtons) <= 0).all()
+
+
+def test_a_bone_between_wall_and_floor_has_an_arrow_of_each():
+    scene = load_scene('drop')
+    with Simulation(scene) as simulation:
+        frame = Frame(scene, 0.0, simulation.state, contacts=np.zeros((3, 3)),
+                      forces=np.array([(0, 0, 300.0), (0, 0, 300), (500, 0, 0)]),
+                      pairs=np.array([(0, GROUND, GROUND), (0, GROUND, GROUND), (0, GROUND, 0)]))
+    _, newtons = force_arrows(frame)
+    assert newtons.tolist() == [600, 500]
 
 
 def test_no_arrow_where_a_source_knows_no_forces():

@@ -107,8 +107,8 @@ class Overlays:
 def force_arrows(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """Tails and tips (k, 2, 3) m of the contact forces, and these (k,) N, the largest first.
 
-    One for all contact points of a bone with another or with the ground, at their centre of
-    pressure. None where forces are unknown, or below LEAST_FORCE.
+    One for all contact points of a bone with another, with a static body or with the ground, at
+    their centre of pressure. None where forces are unknown, or below LEAST_FORCE.
     """
     if frame.forces is None or not len(frame.forces):
         return np.zeros((0, 2, 3)), np.zeros(0)

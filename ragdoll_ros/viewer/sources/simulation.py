@@ -257,7 +257,8 @@ class SimulationSource(Source):
             contacts=None if contacts is None else contacts.positions,
             angles=simulation.joint_angles if requested.angles else None,
             forces=None if contacts is None else contacts.normals * contacts.forces[:, None],
-            pairs=None if contacts is None else np.stack([contacts.a, contacts.b], axis=1),
+            pairs=None if contacts is None else np.stack(
+                [contacts.a, contacts.b, contacts.bodies], axis=1),
             run=self._runs + simulation.reset_count, energy=work + simulation.energy_excess,
             work=work)
         self._new_frames.append(self._frame)

@@ -52,7 +52,7 @@ class Frame:
     forces: np.ndarray | None = None
     """(c, 3) N: normal force at each contact; a node does not publish them."""
     pairs: np.ndarray | None = None
-    """(c, 2) bone indices, the second may be GROUND, at each contact; where forces are known."""
+    """(c, 3) a, b and bodies of Contacts; where forces are known."""
     run: int = 0
     """Number of the run: another one after each reset and restart."""
     energy: float = math.nan
