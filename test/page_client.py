@@ -17,11 +17,14 @@ from ragdoll_ros.viewer.page import Page
 
 PATIENCE = 180.0
 
+START = (4.2, -1.2, 1.5)
+"""m: where the camera of a page is at first."""
+
 
 class PageClient:
     """One open page. It counts as open once its camera has been told."""
 
-    def __init__(self, port, position=(4.2, -1.2, 1.5), look_at=(0.0, 0.0, 0.8)):
+    def __init__(self, port, position=START, look_at=(0.0, 0.0, 0.8)):
         self.bytes = self.windows = self._events = 0
         self.arrivals, self.sizes = [], []
         self._socket = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 import pytest
 
 from ragdoll_ros.falls.recipe import load_recipe
+from ragdoll_ros.files.config import RECIPES, config_folder
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.errors import ModelErrors
@@ -92,6 +93,6 @@ def test_a_scene_with_a_fault_is_still_told_with_its_value(tmp_path):
     with pytest.raises(ModelErrors, match='line'):
         load_scene(str(path))
     with pytest.raises(ModelErrors, match='a mapping without dolls, but a recipe'):
-        load_scene('tumble')
+        load_scene(str(config_folder() / RECIPES / 'tumble.yaml'))
     with pytest.raises(ModelErrors, match='a mapping without who, but a scene'):
-        load_recipe('drop')
+        load_recipe(config_folder() / 'drop.yaml')

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from page_client import batch_of, served, wait
+from page_client import START, batch_of, served, wait
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
@@ -118,7 +118,8 @@ def look_from_the_front(page, client):
     """Look along -x, where the arrows push along the world's axes."""
     wait(lambda: page.frame)
     camera, = (each.camera for each in page.server.get_clients().values())
-    # Again and again: the page may show the home view only now.
+    # The home view comes after the connection, in a thread of its own.
+    wait(lambda: tuple(camera.position) != START)
     wait(lambda: client.look((6.0, 0.0, 1.0), (0.0, 0.0, 1.0)) or tuple(
         camera.look_at - camera.position) == (-6, 0, 0))
 
