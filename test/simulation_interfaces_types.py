@@ -226,26 +226,8 @@ uint64 remaining_steps
 
 VERSION_1 = {
     **VERSION_2,
-    'srv/SetEntityState.srv': """
-string entity
-EntityState state
----
-uint8 INVALID_POSE=101
-Result result
-""",
-    'srv/LoadWorld.srv': """
-string uri
-string resource_string
-bool fail_on_unsupported_element
-bool ignore_missing_or_unsupported_assets
----
-uint8 UNSUPPORTED_FORMAT=101
-uint8 NO_RESOURCE=102
-uint8 RESOURCE_PARSE_ERROR=103
-uint8 MISSING_ASSETS=104
-uint8 UNSUPPORTED_ASSETS=105
-uint8 UNSUPPORTED_ELEMENTS=106
-Result result
-WorldResource world
-"""}
+    'srv/SetEntityState.srv': VERSION_2['srv/SetEntityState.srv'].replace(
+        'bool set_pose\nbool set_twist\nbool set_acceleration\n', ''),
+    'srv/LoadWorld.srv': VERSION_2['srv/LoadWorld.srv'].replace(
+        'Resource world_resource\n', 'string uri\nstring resource_string\n')}
 """Of 1.5.1, where these two differ."""
