@@ -165,9 +165,13 @@ class View:
         """Wait until a condition holds, s at the most; what it said. The page goes on meanwhile."""
         end = time.monotonic() + patience
         while not (said := condition()):
-            assert time.monotonic() < end, 'not in time'
+            assert time.monotonic() < end, f'not in time; notes: {self.notes()}'
             self.page.wait_for_timeout(20)
         return said
+
+    def notes(self):
+        """Texts of the notifications on the page, as of what was refused, though not drawn."""
+        return self.page.locator('.mantine-Notification-root').all_text_contents()
 
     def hold_at(self, scene, start):
         """Pause at the start, where the bones are at (n, 3) m, as the page draws it."""
