@@ -4,7 +4,7 @@ import struct
 import numpy as np
 import pytest
 
-from ragdoll_ros.fit.robots.mesh_file import find_mesh
+from ragdoll_ros.files.robots.mesh_file import find_mesh
 from ragdoll_ros.fit.robots.mesh_shapes import fit_mesh
 from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model import rotation

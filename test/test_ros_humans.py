@@ -16,8 +16,8 @@ from message_packages import build
 from peer import end, kill, start
 from samples import random_coordinates
 
+from ragdoll_ros.files.robots.urdf_tree import parse_urdf
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.pose import Pose
 from ragdoll_ros.model.scene import Placement, Scene

@@ -22,8 +22,8 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
+from ragdoll_ros.files.robots.urdf_tree import parse_urdf
 from ragdoll_ros.files.scene import load_scene, save_scene
-from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model.errors import ModelErrors, RagdollError
 from ragdoll_ros.physics.accuracy import EXACT
 from ragdoll_ros.ros.latched_topic import LATCHED, InvalidQosOverride

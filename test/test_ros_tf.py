@@ -15,8 +15,8 @@ from message_packages import build
 from peer import end, kill, start
 from std_srvs.srv import SetBool
 
+from ragdoll_ros.files.robots.urdf_tree import parse_urdf
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.pose import Pose
 

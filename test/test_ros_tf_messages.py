@@ -14,9 +14,9 @@ from rclpy.parameter import Parameter
 from samples import SCENES, random_coordinates
 from sensor_msgs.msg import JointState
 
+from ragdoll_ros.files.robots.urdf_tree import parse_urdf
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.files.urdf import scene_to_urdf
-from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.pose import Pose
 from ragdoll_ros.model.push import Push

@@ -6,8 +6,8 @@ import pytest
 from specimens import SPECIMENS
 
 from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation, load_doll, save_doll
+from ragdoll_ros.files.robots.urdf_tree import parse_urdf
 from ragdoll_ros.files.urdf import to_urdf
-from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.shapes import SHAPES, SIZES, Sphere

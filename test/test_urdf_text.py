@@ -1,7 +1,7 @@
 """URDF files as they are found: what surrounds the XML, or encodes it otherwise, is read over."""
 import pytest
 
-from ragdoll_ros.files.urdf_tree import decode_urdf
+from ragdoll_ros.files.robots.xml_text import decode_xml
 from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model import errors
 
@@ -32,5 +32,5 @@ def test_errors_name_the_line_of_the_file(tmp_path):
 
 
 def test_a_declaration_within_the_robot_stays_an_error():
-    text = decode_urdf(('<robot>' + DECLARED + '</robot>').encode())
+    text = decode_xml(('<robot>' + DECLARED + '</robot>').encode())
     assert '<?xml' in text

@@ -115,6 +115,12 @@ def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
     return data
 
 
+def plain_name(name: str, otherwise: str) -> str:
+    """The name as doll files allow it: printable, without slashes, not empty."""
+    text = ''.join(c if c.isprintable() and c != '/' else '_' for c in name)
+    return text.strip()[:90] or otherwise
+
+
 def _relative_path(folder: Path, model: str) -> str:
     """Path of a character relative to ``folder``, with slashes."""
     try:

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ...files.doll import plain_name
 from ...model import errors, rotation
 from ...model.ragdoll import WORLD
 from ...model.skeleton import Appearance
-from ..roles.names import plain_name, side_of
+from ..roles.names import side_of
 from .draco import decompress
 from .gltf_file import GltfFile
 from .materials import Materials

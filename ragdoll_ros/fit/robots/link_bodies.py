@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ...files.urdf_tree import UrdfLink, UrdfMesh
+from ...files.robots.mesh_file import find_mesh, read_mesh
+from ...files.robots.urdf_tree import UrdfLink, UrdfMesh
 from ...model import errors, rotation
 from ...model.compound import Compound, principal_axes
 from ...model.pose import Pose
 from ...model.ragdoll import Bone
 from ...model.shapes import Box, Capsule, Part, Shape
-from .mesh_file import find_mesh, read_mesh
 from .mesh_shapes import fit_mesh
 
 PlacedShape = tuple[Shape, Pose]

@@ -12,11 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...files.urdf_tree import LARGEST_TEXT, UrdfJoint, UrdfTree, decode_urdf, parse_urdf
+from ...files.doll import plain_name
+from ...files.robots.urdf_tree import UrdfJoint, UrdfTree, parse_urdf
+from ...files.robots.xml_text import read_xml
 from ...model import errors, rotation
 from ...model.pose import Pose
 from ...model.ragdoll import MAX_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
-from ..roles.names import plain_name
 from .link_bodies import LinkMeshes, link_shapes, make_bone
 
 ROTATING_KINDS = ('revolute', 'continuous', 'floating', 'spherical')
@@ -45,12 +46,7 @@ def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
     """
     path = Path(path)
     try:
-        if not path.is_file():
-            there = 'not a regular file' if path.exists() else 'no such file'
-            raise errors.Unreadable('', there, 'a URDF file')
-        if path.stat().st_size > LARGEST_TEXT:
-            raise errors.Unreadable('', path.stat().st_size, f'at most {LARGEST_TEXT} bytes')
-        doll, notes = _doll(parse_urdf(decode_urdf(path.read_bytes())), path.parent)
+        doll, notes = _doll(parse_urdf(read_xml(path, 'robot')), path.parent)
         return doll, tuple(notes)
     except errors.ModelError as error:
         raise errors.ModelErrors(str(path), [error]) from None
@@ -58,9 +54,7 @@ def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
 
 def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str]]:
     notes: list[str] = []
-    # Zero may lie outside a joint's limits; the doll starts at the nearest angle inside.
-    angles = {child: float(np.clip(0.0, *joint.limits)) for child, joint in tree.joints.items()
-              if joint.limits}
+    angles = tree.initial_angles
     poses = tree.poses(angles)
     meshes = LinkMeshes(folder)
     # Where no link has a mass, links with visuals only become bodies too.

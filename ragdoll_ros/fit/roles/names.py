@@ -20,12 +20,6 @@ ARM = ('upper_arm', 'forearm', 'hand', 'finger')
 LEG = ('thigh', 'shin', 'foot', 'toe')
 
 
-def plain_name(name: str, otherwise: str) -> str:
-    """The name as doll files allow it: printable, without slashes, not empty."""
-    text = ''.join(c if c.isprintable() and c != '/' else '_' for c in name)
-    return text.strip()[:90] or otherwise
-
-
 def side_of(name: str) -> int:
     """Side that a bone's name states: 1 left, -1 right, 0 neither."""
     return _side_and_words(name)[0]

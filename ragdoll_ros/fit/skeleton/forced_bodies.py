@@ -5,9 +5,9 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
+from ...files.doll import plain_name
 from ...model import errors
 from ..reading.character import Character
-from ..roles.names import plain_name
 from .groups import MIN_CLUSTER_VERTICES, vertices_by_bone
 
 

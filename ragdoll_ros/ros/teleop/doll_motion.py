@@ -9,7 +9,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import MultiDOFJointState
 from std_msgs.msg import String
 
-from ...files.urdf_tree import parse_urdf
+from ...files.robots.urdf_tree import parse_urdf
 from ...model.errors import RagdollError
 from ..latched_topic import LATCHED
 

@@ -2,19 +2,17 @@
 
 Transmissions, sensors, colours and what else has no part in the motion are not read.
 """
-import codecs
 import math
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
 import numpy as np
 
-from ..model import errors, rotation
-from ..model.pose import Pose
-from ..model.ragdoll import tree_errors
-from ..model.shapes import SHAPES, SIZES, Shape
-
-LARGEST_TEXT = 32_000_000
+from ...model import errors, rotation
+from ...model.pose import Pose
+from ...model.ragdoll import tree_errors
+from ...model.shapes import SHAPES, SIZES, Shape
+from .xml_text import parse_numbers, parse_root
 
 JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
 
@@ -77,9 +75,18 @@ class UrdfTree:
     def order(self) -> list[str]:
         """All links, parents before children."""
         names = [name for name in self.links if name not in self.joints]
+        children: dict[str, list[str]] = {}
+        for child, joint in self.joints.items():
+            children.setdefault(joint.parent, []).append(child)
         for name in names:
-            names += [child for child, joint in self.joints.items() if joint.parent == name]
+            names += children.get(name, ())
         return names
+
+    @property
+    def initial_angles(self) -> dict[str, float]:
+        """Angles (rad, by child) of joints with limits: zero, or the nearest within the limits."""
+        return {child: float(np.clip(0.0, *joint.limits)) for child, joint in self.joints.items()
+                if joint.limits}
 
     def poses(self, angles: dict[str, float]) -> dict[str, Pose]:
         """Pose of every link in the root's frame at joint angles (rad, by child, default zero)."""
@@ -97,16 +104,7 @@ class UrdfTree:
 
 def parse_urdf(text: str) -> UrdfTree:
     """Parse URDF. Raises a ModelError for what is no URDF or no tree."""
-    if len(text) > LARGEST_TEXT:
-        raise errors.Unreadable('', f'{len(text)} characters', f'at most {LARGEST_TEXT}')
-    if '<!DOCTYPE' in text or '<!ENTITY' in text:
-        raise errors.Unreadable('', 'a DOCTYPE', 'URDF without entities')
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError, RecursionError) as error:
-        raise errors.Unreadable('', str(error), 'XML: a <robot> (expand a xacro first)') from None
-    if root.tag != 'robot':
-        raise errors.WrongForm('', f'<{root.tag}>', 'a <robot>')
+    root = parse_root(text, 'robot')
     links = [_link(element) for element in root.findall('link')]
     joints = [_joint(element) for element in root.findall('joint')]
     edges = [(joint.parent, joint.child) for joint in joints]
@@ -115,30 +113,6 @@ def parse_urdf(text: str) -> UrdfTree:
         raise type(error)(path, error.value, error.expected.replace('bone', 'link'))
     return UrdfTree(root.get('name') or 'robot', {link.name: link for link in links},
                     {joint.child: joint for joint in joints})
-
-
-def decode_urdf(data: bytes) -> str:
-    """Text of a URDF file without its XML declaration; line numbers are kept.
-
-    Accepts a byte order mark, Latin-1, lines before the XML declaration, NULs at the end.
-    """
-    text = _decoded(data).rstrip('\0 \t\r\n')
-    head, found, rest = text.partition('<?xml')
-    # XML allows nothing before a declaration; the text is decoded already.
-    if found and '<robot' not in head:
-        declaration, _, text = rest.partition('?>')
-        text = '\n' * (head + declaration).count('\n') + text
-    return text
-
-
-def _decoded(data: bytes) -> str:
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode('utf-16', errors='replace')
-    try:
-        return data.decode('utf-8-sig')
-    except UnicodeDecodeError:
-        # Every byte is a character of Latin-1; only names and comments can be wrong.
-        return data.decode('latin-1')
 
 
 def _link(element: ElementTree.Element) -> UrdfLink:
@@ -252,15 +226,4 @@ def _vector(element: ElementTree.Element, key: str, where: str,
 
 
 def _numbers(element: ElementTree.Element, key: str, length: int, where: str) -> np.ndarray:
-    text = element.get(key, '')
-    try:
-        # A separating comma is accepted; a decimal comma gives too many numbers.
-        numbers = np.array([float(word) for word in text.replace(',', ' ').split()])
-    except ValueError:
-        numbers = np.zeros(0)
-    if len(numbers) != length or not np.isfinite(numbers).all():
-        what = f'{length} finite numbers' if length > 1 else 'a finite number'
-        if '$' in text:
-            what += ' (expand a xacro first)'
-        raise errors.WrongForm(f'{where}.{element.tag}.{key}', text, what)
-    return numbers
+    return parse_numbers(element.get(key, ''), length, f'{where}.{element.tag}.{key}')

@@ -1,0 +1,1 @@
+"""Files of robots and worlds: URDF and SDF, and the meshes that they name."""
