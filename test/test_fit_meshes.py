@@ -4,7 +4,7 @@ import struct
 import numpy as np
 import pytest
 
-from ragdoll_ros.files.robots.mesh_file import find_mesh
+from ragdoll_ros.files.robots.mesh_file import find_file
 from ragdoll_ros.fit.robots.mesh_shapes import fit_mesh
 from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model import rotation
@@ -159,7 +159,7 @@ def test_packages_are_found_where_ros_looks_and_beside_the_robot(tmp_path, monke
     urdfs = tmp_path / 'src/bot/urdf/arm'
 
     def found(name, folder=urdfs):
-        return find_mesh(name, folder)
+        return find_file(name, folder)
 
     assert found('package://bot/meshes/a.stl') == made[0]
     # The same package, whatever its folder is called.

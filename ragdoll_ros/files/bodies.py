@@ -1,4 +1,7 @@
 """`bodies:` of a scene, each alone or repeated: static ones, and loose ones, which have a mass."""
+import itertools
+from pathlib import Path
+
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange, WrongForm
 from ..model.pose import Pose
@@ -8,7 +11,8 @@ from ..model.scene import Placement
 from ..model.static_body import DEFAULT_COLOR, StaticBody
 from ..model.vectors import floats
 from .doll import build_shape, shape_data
-from .repeat import repeated
+from .repeat import Placed, repeated
+from .robots.robot_bodies import OPTIONS, PARSERS, PlacedRobot, read_robot
 from .schema import entries, has_error_under, try_build
 
 MOST_BODIES = 100_000
@@ -17,10 +21,10 @@ MOTION = ('velocity', 'spin')
 """Keys of loose bodies alone."""
 
 
-def build_bodies(data: dict,
+def build_bodies(data: dict, folder: Path,
                  found: list[ModelError]) -> tuple[tuple[StaticBody, ...], list[Placement]]:
     """The static bodies of a scene's data, and the loose ones as dolls of one bone. Appends every
-    error to ``found``.
+    error to ``found``. Paths are relative to ``folder``.
     """
     static: list[StaticBody] = []
     loose: list[Placement] = []
@@ -28,10 +32,14 @@ def build_bodies(data: dict,
         where = f'bodies[{index}]'
         if has_error_under(found, where):
             continue
-        first = try_build(found, where, _loose_body if 'mass' in entry else _static_body, entry)
-        if first:
-            copies = repeated(first, entry['repeat']) if 'repeat' in entry else [first]
-            (loose if 'mass' in entry else static).extend(copies)
+        if PARSERS.keys() & entry.keys():
+            robot = _robot(entry, folder, where, found)
+            static += itertools.islice(itertools.chain.from_iterable(
+                copy.bodies() for copy in _copies(robot, entry)), MOST_BODIES + 1)
+        elif 'mass' in entry:
+            loose += _copies(try_build(found, where, _loose_body, entry), entry)
+        else:
+            static += _copies(try_build(found, where, _static_body, entry), entry)
         if len(static) + len(loose) > MOST_BODIES:
             found.append(OutOfRange(where, len(static) + len(loose),
                                     f'at most {MOST_BODIES} bodies in all'))
@@ -49,10 +57,27 @@ def body_data(body: StaticBody) -> dict:
             **{key: value for key, value in optional.items() if value is not None}}
 
 
+def _copies(first: Placed | None, entry: dict) -> list[Placed]:
+    if first is None:
+        return []
+    return repeated(first, entry['repeat']) if 'repeat' in entry else [first]
+
+
+def _robot(entry: dict, folder: Path, where: str, found: list[ModelError]) -> PlacedRobot | None:
+    """The robot of an entry with a file. Appends every error to ``found``."""
+    for key in ('mass', *MOTION):
+        if key in entry:
+            found.append(WrongForm(f'{where}.{key}', entry[key], 'none: a robot never moves'))
+    robot, more = read_robot(entry, folder)
+    found += [error.at(where) for error in more]
+    return robot
+
+
 def _static_body(entry: dict) -> StaticBody:
     for key in MOTION:
         if key in entry:
             raise WrongForm(key, entry[key], 'a mass as well: a body without one never moves')
+    _check_options(entry)
     fields = {key: value for key, value in entry.items()
               if key not in ('shape', 'shapes', 'repeat')}
     return StaticBody(shape=build_shape(entry), **fields)
@@ -60,6 +85,7 @@ def _static_body(entry: dict) -> StaticBody:
 
 def _loose_body(entry: dict) -> Placement:
     """A doll of one bone: a uniform solid, its frame that of the body's shape."""
+    _check_options(entry)
     shape = build_shape(entry)
     # A bone's frame has its centre of mass and principal axes.
     pose = shape.principal_pose() if isinstance(shape, Compound) else Pose()
@@ -71,3 +97,9 @@ def _loose_body(entry: dict) -> Placement:
                 floats(pose.orientation), color=tuple(entry.get('color', DEFAULT_COLOR)), **surface)
     start = {key: entry[key] for key in ('position', 'orientation', *MOTION) if key in entry}
     return Placement(Ragdoll(entry['name'], (bone,)), **start)
+
+
+def _check_options(entry: dict) -> None:
+    for key in OPTIONS:
+        if key in entry:
+            raise WrongForm(key, entry[key], "urdf or sdf as well: it is of the file's links")

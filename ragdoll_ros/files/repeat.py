@@ -8,8 +8,9 @@ import numpy as np
 from ..model import rotation
 from ..model.scene import Placement
 from ..model.static_body import StaticBody
+from .robots.robot_bodies import PlacedRobot
 
-Placed = TypeVar('Placed', Placement, StaticBody)
+Placed = TypeVar('Placed', Placement, StaticBody, PlacedRobot)
 
 
 def repeated(first: Placed, repeat: dict) -> list[Placed]:
@@ -41,7 +42,7 @@ def repeated(first: Placed, repeat: dict) -> list[Placed]:
     return copies
 
 
-def _yawed(first: Placement | StaticBody, place: np.ndarray,
+def _yawed(first: Placement | StaticBody | PlacedRobot, place: np.ndarray,
            angle: float) -> tuple[np.ndarray, tuple[float, ...]]:
     """Position (3,) m and orientation of a copy, rotated by ``angle`` rad about the vertical
     through its centre of mass or origin; before, its frame is at ``place``.

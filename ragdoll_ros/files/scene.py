@@ -104,7 +104,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
         if len(placements) > MOST_DOLLS:
             found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
             break
-    static, loose = build_bodies(data, found)
+    static, loose = build_bodies(data, path.parent, found)
     placements += loose
     if len(placements) > MOST_DOLLS and loose:
         found.append(OutOfRange('bodies', len(placements),

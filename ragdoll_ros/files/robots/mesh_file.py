@@ -1,6 +1,6 @@
 """Mesh files of robots (STL, OBJ, DAE): found, and read by trimesh from the extra `fit`.
 
-A URDF names them by package://, model://, file:// or a relative path. Packages are searched in
+URDF and SDF name them by package://, model://, file:// or a relative path. Packages are searched in
 ROS_PACKAGE_PATH and AMENT_PREFIX_PATH as in ROS, and in the folders above the URDF, because robots
 are also distributed without ROS.
 """
@@ -14,7 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...model import errors
+from ...model import errors, rotation
+from ...model.pose import Pose
+from ...model.shapes import Box
+from ...model.vectors import vector
 
 SUFFIXES = ('.stl', '.obj', '.dae')
 
@@ -24,12 +27,15 @@ MAX_MESH_BYTES = 64_000_000
 MAX_COORDINATE = 1e5
 """m; a vertex farther from the origin shows a broken file."""
 
+MIN_THICKNESS = 0.001
+"""m; shortest edge of a box around a mesh."""
+
 PACKAGE_SCHEMES = ('package', 'model')
 """Schemes that begin with the name of a package."""
 
 
-def find_mesh(name: str, folder: Path | None) -> Path | None:
-    """File that a URDF in ``folder`` (None: unknown) names; None if it does not exist."""
+def find_file(name: str, folder: Path | None) -> Path | None:
+    """File that one in ``folder`` (None: unknown) names; None if it does not exist."""
     scheme, found, rest = name.partition('://')
     if not found:
         scheme, rest = 'file', name
@@ -106,6 +112,23 @@ def read_mesh(path: Path, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> np.ndar
         raise errors.Unreadable('', f'{len(triangles)} triangles',
                                 f'some, all within {MAX_COORDINATE:g} m')
     return triangles
+
+
+def bounding_box(triangles: np.ndarray) -> tuple[Box, Pose]:
+    """The smaller of two boxes around triangles (t, 3, 3) m, along the mesh's own axes and along
+    the principal axes of its vertices, and its pose in the mesh's frame.
+    """
+    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    _, principal = np.linalg.eigh(np.cov(points.T))
+    principal = principal * (1, 1, np.linalg.det(principal))
+    boxes = []
+    for axes in (np.eye(3), principal):
+        low, high = (points @ axes).min(axis=0), (points @ axes).max(axis=0)
+        # A flat mesh has no thickness.
+        size = np.maximum(high - low, MIN_THICKNESS)
+        boxes.append((size.prod(), size, axes @ (low + high) / 2, axes))
+    _, size, centre, axes = min(boxes, key=lambda box: box[0])
+    return Box(vector(size)), Pose(centre, rotation.from_matrix(axes))
 
 
 def _metres_per_unit(units: str | None) -> float:

@@ -146,13 +146,18 @@ def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose, wher
     else:
         sizes = {key: tuple(_vector(element, key, where)) if key == 'size'
                  else _number(element, key, where) for key in SIZES[kind]}
-        if not np.any(list(sizes.values())):
-            link.left_out.append(f'a <{kind}> of no size')
-            return
-        try:
-            link.shapes.append((SHAPES[kind](**sizes), pose))
-        except errors.ModelError as error:
-            raise error.at(where) from None
+        add_shape(link, kind, sizes, pose)
+
+
+def add_shape(link: UrdfLink, kind: str, sizes: dict, pose: Pose) -> None:
+    """Add a shape to the link; its tag to ``left_out`` if its sizes are all zero."""
+    if not np.any(list(sizes.values())):
+        link.left_out.append(f'a <{kind}> of no size')
+        return
+    try:
+        link.shapes.append((SHAPES[kind](**sizes), pose))
+    except errors.ModelError as error:
+        raise error.at(f'link {link.name}') from None
 
 
 def _joint(element: ElementTree.Element) -> UrdfJoint:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...files.robots.mesh_file import find_mesh, read_mesh
+from ...files.robots.mesh_file import find_file, read_mesh
 from ...files.robots.urdf_tree import UrdfLink, UrdfMesh
 from ...model import errors, rotation
 from ...model.compound import Compound, principal_axes
@@ -51,7 +51,7 @@ class LinkMeshes:
         return found
 
     def _fit(self, mesh: UrdfMesh) -> list[PlacedShape]:
-        path = find_mesh(mesh.file, self._folder)
+        path = find_file(mesh.file, self._folder)
         if path is None:
             raise errors.Unreadable('', 'no such file', 'one beside the URDF or in a ROS package')
         key = path, mesh.scale

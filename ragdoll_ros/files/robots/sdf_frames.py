@@ -1,0 +1,117 @@
+"""Frames of SDF: poses of links, joints, frames and models relative to each other.
+
+http://sdformat.org/tutorials?tut=pose_frame_semantics
+"""
+from __future__ import annotations
+
+import math
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ...model import errors, rotation
+from ...model.pose import Pose
+from .xml_text import parse_numbers
+
+FRAMED = ('link', 'joint', 'frame', 'model')
+"""Elements that define a frame of their name."""
+
+OWN_FRAMES = ('', '__model__', 'world')
+"""Names of the frame of the model or world itself."""
+
+MODEL_FRAME = Pose()
+
+
+class SdfModel:
+    """A <model>, or a <world> as one; ``prefix`` is what its names have in the file's scope.
+
+    Its methods raise RecursionError where a frame is relative to itself.
+    """
+
+    def __init__(self, element: ElementTree.Element, prefix: str = '') -> None:
+        self.element, self.prefix = element, prefix
+        self.elements = {text_of(child, 'name', child.tag): child for child in element
+                         if child.tag in FRAMED}
+        self.models = {name: SdfModel(child, f'{prefix}{name}::')
+                       for name, child in self.elements.items() if child.tag == 'model'}
+        self._poses: dict[str, Pose] = {}
+
+    def pose(self, name: str) -> Pose:
+        """Pose of a named frame in the model's own."""
+        if name in OWN_FRAMES:
+            return MODEL_FRAME
+        model, _, inner = name.partition('::')
+        if inner and model in self.models:
+            return self.pose(model).compose(self.models[model].pose(inner))
+        if name not in self.elements:
+            raise errors.WrongForm(f'{self.prefix}pose', name,
+                                   errors.one_of([*OWN_FRAMES[1:], *self.elements], name))
+        if name not in self._poses:
+            self._poses[name] = self._pose_of(self.elements[name], name)
+        return self._poses[name]
+
+    def place(self, element: ElementTree.Element, base: str) -> Pose:
+        """Pose of an element in the model's frame; ``base`` is the frame of a pose without one."""
+        found = element.find('pose')
+        if found is None:
+            return self.pose(base)
+        named = found.get('relative_to') or found.get('frame') or base
+        return self.pose(named).compose(_parse_pose(
+            found, f'{self.prefix}{element.get("name", element.tag)}.pose'))
+
+    def link_of(self, name: str) -> str | None:
+        """Link, by its name in the file, that a frame is attached to; None: the world, or none."""
+        model, _, inner = name.partition('::')
+        if inner and model in self.models:
+            return self.models[model].link_of(inner)
+        element = self.elements.get(name)
+        if element is None or element.tag == 'joint':
+            return None
+        if element.tag == 'frame':
+            return self.link_of(element.get('attached_to', ''))
+        if element.tag == 'model':
+            inside = self.models[name]
+            return next((inside.link_of(link) for link, found in inside.elements.items()
+                         if found.tag == 'link'), None)
+        return f'{self.prefix}{name}'
+
+    def _pose_of(self, element: ElementTree.Element, name: str) -> Pose:
+        if element.tag == 'joint':
+            return self.place(element, child_text(element, 'child', f'joint {self.prefix}{name}'))
+        place = self.place(element, element.get('attached_to', ''))
+        if held := element.get('placement_frame'):
+            return place.compose(self.models[name].pose(held).relative(MODEL_FRAME))
+        return place
+
+
+def text_of(element: ElementTree.Element, key: str, where: str) -> str:
+    """Attribute of an element. Raises WrongForm if it is missing or empty."""
+    text = element.get(key)
+    if not text:
+        raise errors.WrongForm(where, text, f'a {key}')
+    return text
+
+
+def child_text(element: ElementTree.Element, tag: str, where: str) -> str:
+    """Text of an element's child ``tag``. Raises WrongForm if it is missing or empty."""
+    text = (element.findtext(tag) or '').strip()
+    if not text:
+        raise errors.WrongForm(where, text or None, f'a <{tag}>')
+    return text
+
+
+def _parse_pose(element: ElementTree.Element, where: str) -> Pose:
+    """Pose of a <pose>: x y z roll pitch yaw, in rad or degrees, or x y z and a quaternion."""
+    text = (element.text or '').strip()
+    if not text:
+        return MODEL_FRAME
+    if element.get('rotation_format') == 'quat_xyzw':
+        numbers = parse_numbers(text, 7, where)
+        if not np.any(numbers[3:]):
+            raise errors.NotUnit(where, text, 'a quaternion x, y, z, w, not zero')
+        return Pose(numbers[:3], rotation.normalized(numbers[3:]))
+    numbers = parse_numbers(text, 6, where)
+    angles = numbers[3:].tolist()
+    if element.get('degrees') in ('true', '1'):
+        angles = map(math.radians, angles)
+    return Pose(numbers[:3], rotation.from_rpy(*angles))
