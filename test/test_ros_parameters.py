@@ -9,7 +9,7 @@ import pytest
 import rclpy
 import yaml
 from conftest import ROOT
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from geometry_msgs.msg import PoseArray
 from rcl_interfaces.msg import Log, ParameterType
 from rcl_interfaces.srv import GetParameters, ListParameters
@@ -163,6 +163,20 @@ def test_the_start_is_told_in_one_line(make_node, peer):
     said = rosout(peer, make_node(scene='crowd', accuracy='draft', engine='bullet'))
     peer.wait(lambda: ('scene crowd: 10 dolls of 100 bones, engine bullet, accuracy draft; poses '
                        'on /ragdoll/poses, status on /diagnostics') in said())
+
+
+def test_overlaps_at_the_start_are_told(make_node, peer, tmp_path):
+    ball = '{name: ball, bones: [{name: ball, shape: {sphere: {radius: 0.1}}, mass: 1, ' \
+           'position: [0, 0, 0]}]}'
+    path = tmp_path / 'deep.yaml'
+    path.write_text(f'dolls: [{{doll: {ball}, position: [0, 0, 0.58]}}]\n'
+                    'bodies: [{name: post, shape: {box: {size: [1, 1, 1]}}}]\n')
+    said = rosout(peer, make_node(scene=str(path), engine='rigid'))
+    words = 'ball is 20.0 mm deep in post'
+    peer.wait(lambda: f'overlaps at the start: {words}' in said())
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.wait(lambda: any(KeyValue(key='initial_overlaps', value=words) in report.status[0].values
+                          for _, report in reports))
 
 
 def dump(peer, path):

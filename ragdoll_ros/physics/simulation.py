@@ -20,7 +20,7 @@ from .accuracy import Accuracy, resolve_accuracy
 from .actions.grab import DRAG_TIME, Grab, Hands, checked_point
 from .actions.joint_springs import JointSpring, JointSprings
 from .actions.push_queue import PushQueue
-from .engine.protocol import Contacts, Drives, Engine, Springs, Wrenches
+from .engine.protocol import Contacts, Drives, Engine, Overlap, Springs, Wrenches
 from .engine.registry import resolve_engine
 from .rigid_body import GroundHeights, JointGap
 from .sleeping import SleepDetector
@@ -93,6 +93,7 @@ class Simulation:
         self._make = partial(choice.make, scene, workers=int(workers))
         self._engine: Engine = self._make(resolve_accuracy(accuracy))
         self._placed: GeneralizedState | None = None
+        self._overlaps: tuple[Overlap, ...] | None = None
         if any(placement.angles or placement.rates for placement in scene.dolls):
             self._placed = placed_coordinates(scene.dolls)
             self._engine.set_coordinates(self._placed)
@@ -208,6 +209,18 @@ class Simulation:
     def contacts(self) -> Contacts:
         """All contact points."""
         return self._engine.contacts()
+
+    @property
+    def initial_overlaps(self) -> tuple[Overlap, ...]:
+        """What overlaps at the start by more than 1 mm, the deepest first; computed when it is
+        first read. Raises WrongForm: the engine is not rigid.
+        """
+        if self._overlaps is None:
+            placed = self._placed or placed_coordinates(self.scene.dolls)
+            self._overlaps = self._engine.overlaps(placed)
+        if self._overlaps is None:
+            raise errors.WrongForm('engine', self.engine_name, 'rigid, which finds overlaps')
+        return self._overlaps
 
     @property
     def contact_impulses(self) -> np.ndarray:
@@ -384,7 +397,7 @@ class Simulation:
             raise errors.OutOfRange('coordinates', (q.shape, v.shape), f'{layout.sizes} numbers')
         errors.check_finite('coordinates', (*q.tolist(), *v.tolist()))
         layout.check_orientations(q)
-        self._placed = GeneralizedState(q, v)
+        self._placed, self._overlaps = GeneralizedState(q, v), None
         self._engine.set_coordinates(self._placed)
         self._engine.discard(self._start)
         self._start = self._engine.save()

@@ -24,6 +24,9 @@ PERIOD = 1.0
 MIN_SPEED_RATIO = 0.95
 """Real-time factor, relative to the requested one, below which a report warns."""
 
+MOST_OVERLAPS = 4
+"""Of several initial overlaps these many are named."""
+
 
 class Diagnostics:
     """Measures the cost of ticks; reports real-time factor, cost, error measures and counters.
@@ -124,6 +127,7 @@ class Diagnostics:
             'engine': simulation.engine_name,
             'engine_reason': simulation.engine_reason,
             'simulated_time': simulation.time / SECOND,
+            'initial_overlaps': overlaps_text(simulation),
             'push': pushes_text(simulation.pushes),
             **self._node_values(),
             **simulation.measures(),
@@ -168,6 +172,16 @@ def status_name(namespace: str, node: str) -> str:
 def pushes_text(pushes: Sequence[Push]) -> str:
     """Force, torque and bone of each push."""
     return ', '.join(_push_text(push) for push in pushes) or 'none'
+
+
+def overlaps_text(simulation: Simulation) -> str:
+    """The deepest initial overlaps in words; 'none', and 'unknown' by engines other than rigid."""
+    if simulation.engine_name != 'rigid':
+        return 'unknown'
+    found = simulation.initial_overlaps
+    more = len(found) - MOST_OVERLAPS
+    return ', '.join([*map(str, found[:MOST_OVERLAPS]),
+                      *([f'and {more} more'] if more > 0 else [])]) or 'none'
 
 
 def _push_text(push: Push) -> str:

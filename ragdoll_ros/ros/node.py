@@ -21,7 +21,7 @@ from ..files.scene import load_scene
 from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
-from .diagnostics import Diagnostics, DuplicateNodes
+from .diagnostics import Diagnostics, DuplicateNodes, overlaps_text
 from .event_log import EventLog
 from .imu.publishers import ImuPublishers
 from .inputs.input_counts import InputCounts
@@ -248,6 +248,8 @@ class RagdollNode(Node):
 
     def _log_start(self) -> None:
         self.get_logger().info(start_line(self.simulation, self.settings, self))
+        if (overlaps := overlaps_text(self.simulation)) not in ('none', 'unknown'):
+            self.get_logger().warning(f'overlaps at the start: {overlaps}')
 
     def _replace(self, simulation: Simulation) -> None:
         self.simulation.close()

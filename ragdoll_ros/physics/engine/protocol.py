@@ -64,6 +64,24 @@ class Contacts:
 
 
 @dataclass(frozen=True)
+class Overlap:
+    """A bone that begins in something else.
+
+    Args:
+        bone: its name in the scene.
+        other: name of another bone or of a static body, or 'ground'.
+        depth: m, the shortest way for one of the two out of the other.
+    """
+
+    bone: str
+    other: str
+    depth: float
+
+    def __str__(self) -> str:
+        return f'{self.bone} is {1000 * self.depth:.1f} mm deep in {self.other}'
+
+
+@dataclass(frozen=True)
 class AppliedWrench:
     """A force (3,) N and a torque (3,) N m on a bone, constant over one step.
 
@@ -238,6 +256,11 @@ class Engine(Protocol):
     @property
     def contact_impulses(self) -> np.ndarray | None:
         """Impulse (n, 3) N s of contacts on each bone since the start; None: not counted."""
+
+    def overlaps(self, coordinates: GeneralizedState) -> tuple[Overlap, ...] | None:
+        """What would overlap at ``coordinates`` by more than a contact, the deepest first; None:
+        not found out. The state remains to the bit.
+        """
 
     def bones_on_ground(self) -> np.ndarray:
         """Which bones (n,) touch the ground."""

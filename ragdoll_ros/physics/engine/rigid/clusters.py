@@ -273,16 +273,19 @@ class Clusters:
         """What contacts() returns, of one cluster."""
         known = _known_contacts(cluster)
         return contact_points(known, bone_of_body, np.zeros(len(known), np.int64),
-                              self._static_bodies(cluster, known),
+                              self._touched_bodies(cluster, known),
                               np.full(len(known), cluster.state.stats['last_dt'][0]))
 
-    def _static_bodies(self, cluster: Cluster, contacts: np.ndarray) -> np.ndarray:
+    def static_bodies(self, cluster: Cluster) -> np.ndarray:
+        """Indices (s,) of the static bodies that the last geoms of a cluster are of."""
+        _, near = self.static_geoms.bones_and_geoms(cluster.static_keys)
+        return self.static_geoms.bodies[np.unique(near)]
+
+    def _touched_bodies(self, cluster: Cluster, contacts: np.ndarray) -> np.ndarray:
         """Indices (c,) of the static bodies that contacts of a cluster touch, or GROUND."""
         bodies = np.full(len(contacts), GROUND)
         if len(cluster.static_keys):
-            system, (_, near) = cluster.system, self.static_geoms.bones_and_geoms(
-                cluster.static_keys)
-            static = self.static_geoms.bodies[np.unique(near)]
+            system, static = cluster.system, self.static_bodies(cluster)
             of_geom = np.append(np.full(len(system.geoms) - len(static), GROUND), static)
             pair = contacts['patch'] - len(system.geoms)
             bodies[pair >= 0] = of_geom[system.pairs['b'][pair[pair >= 0]]]

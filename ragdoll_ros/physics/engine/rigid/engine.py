@@ -15,10 +15,11 @@ from ...accuracy import DRAFT, Accuracy
 from ...rigid_body import GroundHeights
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
 from ..doll_totals import DollTotals
-from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, allowed_penetration
+from ..protocol import GROUND, Contacts, Drives, Overlap, Springs, Wrenches, allowed_penetration
 from .broad_phase import BroadPhase
 from .clusters import Cluster, Clusters
 from .contact_points import contact_wrenches
+from .initial_overlaps import find_overlaps
 from .loads import NO_LOADS, NO_SPRINGS, load_records, spring_records
 
 ERROR_STEP_RATIO = 0.25
@@ -119,6 +120,15 @@ class RigidEngine:
             self._wake(of_doll == of_doll[self.scene.doll_of_bone[acts.bone]])
         self._update_clusters(duration)
         self._advance(duration, actions, self.accuracy)
+
+    def overlaps(self, coordinates: GeneralizedState) -> tuple[Overlap, ...]:
+        snapshot, start = self.save(), self._last_start
+        try:
+            return find_overlaps(self.scene, self._clusters, self._broad_phase, self.layout,
+                                 coordinates.q)
+        finally:
+            self.restore(snapshot)
+            self._last_start = start
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
         self._clusters.set_velocities(dolls, np.zeros_like(self._clusters.v))

@@ -138,6 +138,9 @@ class SubsteppedEngine(ABC):
         """Whether any doll touches the ground, (d,): the dolls are one cluster."""
         return np.full(len(self.sleeping), any(GROUND in pair for pair in self._touching_pairs()))
 
+    def overlaps(self, coordinates: GeneralizedState) -> None:
+        return None
+
     @property
     def contact_impulses(self) -> None:
         return None
