@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .model.compound import Compound as Compound
     from .model.drive import Drive as Drive
     from .model.errors import RagdollError as RagdollError
+    from .model.follow import Follow as Follow
     from .model.push import Push as Push
     from .model.ragdoll import Bone as Bone
     from .model.ragdoll import Joint as Joint
@@ -39,9 +40,10 @@ if TYPE_CHECKING:
 _MODULES = {
     'Bone': 'model.ragdoll', 'Box': 'model.shapes', 'Capsule': 'model.shapes',
     'Compound': 'model.compound', 'Cylinder': 'model.shapes', 'Drive': 'model.drive',
-    'Ground': 'model.scene', 'Joint': 'model.ragdoll', 'Part': 'model.shapes',
-    'Placement': 'model.scene', 'Push': 'model.push', 'Ragdoll': 'model.ragdoll',
-    'RagdollError': 'model.errors', 'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',
+    'Follow': 'model.follow', 'Ground': 'model.scene', 'Joint': 'model.ragdoll',
+    'Part': 'model.shapes', 'Placement': 'model.scene', 'Push': 'model.push',
+    'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
+    'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'StaticBody': 'model.static_body', 'load_doll': 'files.doll',
     'load_scene': 'files.scene', 'person': 'people.person', 'run_many': 'physics.run_many',

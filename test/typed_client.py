@@ -16,6 +16,7 @@ from ragdoll_ros import (
     Compound,
     Cylinder,
     Drive,
+    Follow,
     Ground,
     Joint,
     Part,
@@ -59,6 +60,7 @@ def fall(scene: Scene, folder: Path) -> State:
     recorder, riders = Recorder(scene), Riders(scene)
     with Simulation(scene, accuracy='normal', engine='auto', workers=1) as simulation:
         simulation.push(Push(scene.bone_names[0], force=(100.0, 0.0, 0.0)))
+        print(Follow(500.0, 50.0).is_exact, simulation.stale_bodies)
         simulation.push(Drive(scene.bone_names[0], velocity=(1.0, 0.0, 0.0)), channel='drive')
         simulation.grab('hand', scene.bone_names[0], (0.0, 0.0, 0.0))
         simulation.let_go('hand')

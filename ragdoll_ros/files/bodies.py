@@ -1,9 +1,12 @@
-"""`bodies:` of a scene, each alone or repeated: static ones, and loose ones, which have a mass."""
+"""`bodies:` of a scene, each alone or repeated: static ones, loose ones, which have a mass, and
+driven ones, which follow what they are told.
+"""
 import itertools
 from pathlib import Path
 
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange, WrongForm
+from ..model.follow import Follow
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.rotation import IDENTITY
@@ -20,10 +23,15 @@ MOST_BODIES = 100_000
 MOTION = ('velocity', 'spin')
 """Keys of loose bodies alone."""
 
+EXACT = 'exact'
+
+NOMINAL_MASS = 1.0
+"""kg of a body that follows exactly and has no mass of its own. It has no effect."""
+
 
 def build_bodies(data: dict, folder: Path,
                  found: list[ModelError]) -> tuple[tuple[StaticBody, ...], list[Placement]]:
-    """The static bodies of a scene's data, and the loose ones as dolls of one bone. Appends every
+    """The static bodies of a scene's data, and all others as dolls of one bone. Appends every
     error to ``found``. Paths are relative to ``folder``.
     """
     static: list[StaticBody] = []
@@ -36,7 +44,7 @@ def build_bodies(data: dict, folder: Path,
             robot = _robot(entry, folder, where, found)
             static += itertools.islice(itertools.chain.from_iterable(
                 copy.bodies() for copy in _copies(robot, entry)), MOST_BODIES + 1)
-        elif 'mass' in entry:
+        elif _moves(entry):
             loose += _copies(try_build(found, where, _loose_body, entry), entry)
         else:
             static += _copies(try_build(found, where, _static_body, entry), entry)
@@ -45,6 +53,17 @@ def build_bodies(data: dict, folder: Path,
                                     f'at most {MOST_BODIES} bodies in all'))
             break
     return tuple(static), loose
+
+
+def follow_of(entry: dict) -> Follow | None:
+    """``follow`` of an entry of a scene."""
+    value = entry.get('follow')
+    return value if value is None else Follow() if value == EXACT else Follow(**value)
+
+
+def follow_data(follow: Follow) -> str | dict:
+    """``follow`` in the form of scene.schema.json."""
+    return EXACT if follow.is_exact else dict(vars(follow))
 
 
 def body_data(body: StaticBody) -> dict:
@@ -65,12 +84,16 @@ def _copies(first: Placed | None, entry: dict) -> list[Placed]:
 
 def _robot(entry: dict, folder: Path, where: str, found: list[ModelError]) -> PlacedRobot | None:
     """The robot of an entry with a file. Appends every error to ``found``."""
-    for key in ('mass', *MOTION):
+    for key in ('mass', 'follow', *MOTION):
         if key in entry:
             found.append(WrongForm(f'{where}.{key}', entry[key], 'none: a robot never moves'))
     robot, more = read_robot(entry, folder)
     found += [error.at(where) for error in more]
     return robot
+
+
+def _moves(entry: dict) -> bool:
+    return 'mass' in entry or 'follow' in entry
 
 
 def _static_body(entry: dict) -> StaticBody:
@@ -86,17 +109,19 @@ def _static_body(entry: dict) -> StaticBody:
 def _loose_body(entry: dict) -> Placement:
     """A doll of one bone: a uniform solid, its frame that of the body's shape."""
     _check_options(entry)
-    shape = build_shape(entry)
+    shape, follow = build_shape(entry), follow_of(entry)
+    if 'mass' not in entry and follow and not follow.is_exact:
+        raise WrongForm('follow', entry['follow'], 'a mass as well, which the force moves')
     # A bone's frame has its centre of mass and principal axes.
     pose = shape.principal_pose() if isinstance(shape, Compound) else Pose()
     if isinstance(shape, Compound):
         shape = shape.in_frame(pose)
     surface = {key: entry[key] for key in ('friction', 'rolling_friction', 'restitution')
                if key in entry}
-    bone = Bone(entry['name'], shape, entry['mass'], floats(pose.position),
+    bone = Bone(entry['name'], shape, entry.get('mass', NOMINAL_MASS), floats(pose.position),
                 floats(pose.orientation), color=tuple(entry.get('color', DEFAULT_COLOR)), **surface)
     start = {key: entry[key] for key in ('position', 'orientation', *MOTION) if key in entry}
-    return Placement(Ragdoll(entry['name'], (bone,)), **start)
+    return Placement(Ragdoll(entry['name'], (bone,)), follow=follow, **start)
 
 
 def _check_options(entry: dict) -> None:

@@ -9,7 +9,7 @@ from ..model.errors import ModelError, OutOfRange
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
-from .bodies import body_data, build_bodies
+from .bodies import body_data, build_bodies, follow_data, follow_of
 from .doll import build_doll, doll_data
 from .repeat import repeated
 from .schema import (
@@ -146,6 +146,8 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
             if values := getattr(placement, name):
                 entry[key] = {angle: round(math.degrees(value), 9)
                               for angle, value in values.items()}
+        if placement.follow:
+            entry['follow'] = follow_data(placement.follow)
         data['dolls'].append(entry)
     if scene.bodies:
         data['bodies'] = [body_data(body) for body in scene.bodies]
@@ -164,7 +166,7 @@ def _placement(doll: Ragdoll, entry: dict) -> Placement:
     for name, key in ANGLE_KEYS.items():
         fields[name] = {angle: math.radians(value) for angle, value in entry.get(key, {}).items()}
     try:
-        return Placement(doll, **fields)
+        return Placement(doll, follow=follow_of(entry), **fields)
     except ModelError as error:
         name, _, angle = error.path.partition('.')
         if name not in ANGLE_KEYS:

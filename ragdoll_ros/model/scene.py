@@ -13,6 +13,7 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
+from .follow import Follow
 from .forward_kinematics import BoneMotion, bone_motions
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
@@ -106,9 +107,11 @@ class Placement:
         angles: initial joint angles, rad, by the names of the doll's angles; 0 where none is given.
             They are rounded to 1e-9 degrees, so that files in degrees read back to the same bits.
         rates: initial rates of joint angles, rad/s; rounded likewise.
+        follow: how a doll of one bone follows Simulation.drive_body(); None: it does not.
 
     Raises:
-        NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none.
+        NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none; for ``follow`` of a
+            doll of several bones, or with a velocity of what follows exactly.
         UnknownJoint, OutOfRange: for an angle that the doll does not have, or outside its limits.
 
     Example:
@@ -124,6 +127,7 @@ class Placement:
     spin: Vector = (0.0, 0.0, 0.0)
     angles: Mapping[str, float] = field(default_factory=dict, hash=False)
     rates: Mapping[str, float] = field(default_factory=dict, hash=False)
+    follow: Follow | None = None
 
     def __post_init__(self) -> None:
         for key in ('position', 'velocity', 'spin'):
@@ -132,6 +136,17 @@ class Placement:
             set_fields(self, **{key: _checked_angles(self.doll, key, getattr(self, key))})
         set_fields(self, name=self.name or self.doll.name, orientation=unit_vector(
             'orientation', self.orientation, 'a quaternion x, y, z, w, not zero', 4))
+        if self.follow is not None and len(self.doll.bones) > 1:
+            raise errors.WrongForm('follow', self.follow, 'a body, or a doll of one bone')
+        for key in ('velocity', 'spin') if self.is_kinematic else ():
+            if any(getattr(self, key)):
+                raise errors.WrongForm(key, getattr(self, key), 'none: what follows exactly stands '
+                                       'until drive_body() moves it')
+
+    @property
+    def is_kinematic(self) -> bool:
+        """Whether it moves as it is told, whatever acts on it."""
+        return self.follow is not None and self.follow.is_exact
 
     def bone_pose(self, bone: Bone) -> Pose:
         """Initial pose of a bone, world frame."""

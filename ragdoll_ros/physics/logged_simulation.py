@@ -58,6 +58,12 @@ class LoggedSimulation(Simulation):
             self.on_event('release', {'channel': channel})
         return ended
 
+    def drive_body(self, name: str, pose: Sequence[float] | None = None,
+                   twist: Sequence[float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> None:
+        super().drive_body(name, pose, twist)
+        self.on_event('drive_body', {'name': name, 'twist': list(map(float, twist)),
+                                     'pose': None if pose is None else list(map(float, pose))})
+
     def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
              target: Sequence[float] | None = None) -> None:
         super().grab(hand, bone, point, target)
@@ -147,7 +153,8 @@ _ACTIONS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
-       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state')},
+       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state',
+                    'drive_body')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),
     'parts': lambda simulation, parts: setattr(simulation, 'samples_per_tick', parts),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),

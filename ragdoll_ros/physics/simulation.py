@@ -17,6 +17,7 @@ from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
 from ..model.vectors import finite_floats, unit_vector
 from .accuracy import Accuracy, resolve_accuracy
+from .actions.driven_bodies import DrivenBodies
 from .actions.grab import DRAG_TIME, Grab, Hands, checked_point
 from .actions.joint_springs import JointSpring, JointSprings
 from .actions.push_queue import PushQueue
@@ -92,6 +93,8 @@ class Simulation:
         """Name of the engine, and why 'auto' did not select rigid."""
         self._make = partial(choice.make, scene, workers=int(workers))
         self._engine: Engine = self._make(resolve_accuracy(accuracy))
+        if not self._engine.moves_bodies and any(placement.follow for placement in scene.dolls):
+            raise errors.WrongForm('engine', self.engine_name, 'rigid, for bodies with follow')
         self._placed: GeneralizedState | None = None
         self._overlaps: tuple[Overlap, ...] | None = None
         if any(placement.angles or placement.rates for placement in scene.dolls):
@@ -275,6 +278,41 @@ class Simulation:
         """
         return self._pushes.release(channel)
 
+    def drive_body(self, name: str, pose: Sequence[float] | None = None,
+                   twist: Sequence[float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> None:
+        """Move a body with `follow`: from now on at constant velocity until the next call, or for
+        0.2 s of simulated time. Then it stands, and is one of ``stale_bodies``.
+
+        What follows exactly is at the end of the next tick where pose and twist take it. A pose
+        farther away than 10 m/s explain in a tick places the body there, without a blow, and is
+        counted. Work on dolls is work of pushes.
+
+        Args:
+            name: of the body.
+            pose: (7,) of its frame, world frame: x, y, z, m, and quaternion x, y, z, w; None: from
+                where it is.
+            twist: (6,) world frame: velocity of the frame's origin, m/s, angular velocity, rad/s.
+
+        Raises:
+            UnknownDoll: the scene has no such body with `follow`.
+            NotFinite, NotUnit, WrongForm, OutOfRange: for a pose or twist that is none.
+
+        >>> simulation.drive_body('robot', twist=(1, 0, 0, 0, 0, 0))  # doctest: +SKIP
+        """
+        jump = self._driven.drive(name, pose, twist, self.time, self.tick, self.state)
+        if jump is not None:
+            doll, placed = jump
+            layout, here = self._engine.layout, self._engine.coordinates
+            here.q[layout.root_positions[doll]] = placed.position
+            here.q[layout.root_orientations[doll]] = placed.orientation
+            self._engine.set_doll(doll, here)
+            self.asleep = False
+
+    @property
+    def stale_bodies(self) -> tuple[str, ...]:
+        """Names of bodies with `follow` that drive_body() has not moved for 0.2 s."""
+        return self._driven.stale(self.time)
+
     def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
              target: Sequence[float] | None = None) -> None:
         """Attach a hand to a point of a bone by a spring; it releases what it held before.
@@ -348,11 +386,15 @@ class Simulation:
         begin, substates = self.time, [self.state]
         for sample in range(1, self._samples_per_tick + 1):
             end = begin + self.tick * sample // self._samples_per_tick
-            if self.asleep and not self._pushes and not self._springs:
+            if self.asleep and not self._pushes and not self._springs and not (
+                    self._driven.moving_bones(self.time)):
                 self.time = end
             while self.time < end:
                 change = self._pushes.next_change(self.time) if self._pushes else None
-                self._advance_until(end if change is None else min(end, change))
+                until = end if change is None else min(end, change)
+                if self._driven:
+                    until = min(until, self._driven.next_change(self.time, end))
+                self._advance_until(until)
             substates.append(self.state)
         self.substates = tuple(substates)
         if self._pushes:
@@ -442,6 +484,7 @@ class Simulation:
             here.q[layout.root_orientations[index]] = unit_vector(
                 'orientation', orientation, 'a quaternion x, y, z, w, not zero', 4)
         self._engine.set_doll(index, here)
+        self._driven.hold(index, self.state, self.time)
         self._sleep_detector.restart(np.arange(len(names)) == index)
         self.asleep = False
         if self._swings and self.scene.dolls[index].doll.swings:
@@ -465,6 +508,7 @@ class Simulation:
             self._engine.set_coordinates(self._placed)
         self._start = self._engine.save()
         self._engine.restore_checkpoint(engine_checkpoint)
+        self._driven.forget_twists()
         self._sleep_detector.restart()
         self.asleep = bool(self._engine.sleeping.all())
         if self._swings:
@@ -487,6 +531,7 @@ class Simulation:
         self.substates = (self.state,)
         self._pushes = PushQueue(self.scene)
         self._hands, self._joint_springs = Hands(self.scene), JointSprings(self.scene)
+        self._driven = DrivenBodies(self.scene, self.state)
         self._sleep_detector.restart()
         self.asleep = False
         if self._swings:
@@ -505,7 +550,10 @@ class Simulation:
             'joint_gap_m': float(self._gap.gaps(self.state).max(initial=0.0)),
             'limit_overshoot_rad': max(0.0, float(
                 engine.layout.limit_violations(self.coordinates.q).max(initial=0.0))),
-            'sinking_m': max(0.0, -float(self._heights(self.state).min())),
+            'sinking_m': max(0.0, -float(
+                self._heights(self.state)[self._yields].min(initial=np.inf))),
+            **({'stale_bodies': len(self.stale_bodies), 'body_jumps_total': self._driven.jumps}
+               if self._driven else {}),
             'asleep': self.asleep}
 
     def ledger(self) -> dict[str, int]:
@@ -523,9 +571,15 @@ class Simulation:
     def _advance_until(self, end: int) -> None:
         """Integrate until ``end``, ns; no push begins or ends before."""
         loads: tuple[Wrenches, Springs, Drives] = (), self._springs, ()
+        if self._driven:
+            for doll, velocity, spin in self._driven.twists(self.time, end):
+                self._engine.set_twist(doll, velocity, spin)
+            loads = (), loads[1], self._driven.drives(self.time, self.state,
+                                                      self._engine.sleeping)
+            self.asleep = bool(self._engine.sleeping.all())
         if self._pushes:
             loads = (self._pushes.wrenches(self.time, self.state), loads[1],
-                     self._pushes.drives(self.time))
+                     [*loads[2], *self._pushes.drives(self.time)])
         if any(loads):
             self.asleep = False
         if not self.asleep:
@@ -539,7 +593,8 @@ class Simulation:
         detector = self._sleep_detector
         if self.asleep or not self.accuracy.sleep or detector.all_move(self._engine):
             return
-        loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs))
+        loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs),
+                  *self._driven.moving_bones(self.time))
         dolls = detector.find_ready(self._engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs
             return
@@ -564,6 +619,12 @@ class Simulation:
         unstable = untested & ~verdict.stable
         detector.watch(unstable, self._stability_test.duration, engine.doll_totals.kinetic)
         return unstable
+
+    @cached_property
+    def _yields(self) -> np.ndarray:
+        """(n,) bones that are not of bodies that follow exactly."""
+        kinematic = np.array([placement.is_kinematic for placement in self.scene.dolls])
+        return ~kinematic[self.scene.doll_of_bone]
 
     @cached_property
     def _gap(self) -> JointGap:

@@ -62,7 +62,8 @@ class StabilityTest:
     """Tests clusters of a scene's dolls by copies in simulation, at rest and disturbed."""
 
     def __init__(self, scene: Scene) -> None:
-        extent = max(placement.doll.extent for placement in scene.dolls)
+        extent = max((placement.doll.extent for placement in scene.dolls
+                      if not placement.is_kinematic), default=0.0)
         gravity = math.hypot(*scene.gravity)
         self.duration = DURATION * math.sqrt(2 * extent / (3 * gravity)) if gravity else math.inf
         """s of simulated time in which what is not stable departs."""

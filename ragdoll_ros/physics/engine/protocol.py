@@ -181,6 +181,8 @@ class Engine(Protocol):
     """Relative energy gain in a tick above which the state counts as diverged; see Guard."""
     supports_joint_springs: bool
     """Whether advance() takes AppliedJointSpring."""
+    moves_bodies: bool
+    """Whether there are bodies with ``follow``, and set_twist()."""
     simulates_copies: bool
     """Whether there are set_velocities() and simulate_copy(), for StabilityTest."""
     sleeping: np.ndarray
@@ -225,6 +227,11 @@ class Engine(Protocol):
         """Set the coordinates and velocities of one doll to its own in ``coordinates``, and wake
         all of its old cluster. The change of energy counts as work of pushes. If it is deeper in
         the ground than allowed_penetration(), it is lifted onto it.
+        """
+
+    def set_twist(self, doll: int, velocity: np.ndarray, spin: np.ndarray) -> None:
+        """Set the velocity (3,) m/s of the centre of mass and the angular velocity (3,) rad/s,
+        world frame, at which a doll that follows exactly moves from now on; wake its cluster.
         """
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),

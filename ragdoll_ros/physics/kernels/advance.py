@@ -5,6 +5,7 @@ One tick of a cluster, and what its stages read and write:
     advance ── for each cluster: advance_cluster
       enable_separated_pairs     q, excluded -> excluded          pairs that overlapped at the start
       update_kinematics_and_gaps q, v -> kinematics, gaps         narrow phase
+      follow_twist               q, gaps -> v                     what a kinematic body carries
       until the time is up:
         can_fly                  gaps, contacts, v                does everything separate?
         begin_dense_step         q, v, loads -> dense_step        DOP853 with dense output
@@ -48,7 +49,7 @@ from .flight.first_contact import find_first_contact
 from .flight.flight import can_fly, follow_dense_step
 from .maths.vectors import add, put, vec
 from .stepping.contact_step import approaches_fast, begin_contact_step
-from .stepping.impact import impact
+from .stepping.impact import follow_twist, impact
 from .stepping.momentum import sum_dolls
 from .stepping.step_control import step_to_impact
 from .system import SYSTEM, System
@@ -140,6 +141,9 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         dense.valid = dense.first_rate_known = 0
     if separated or duration == 0.0:
         refresh_gaps(s, ws, cluster)
+    if duration > 0.0 and stats.twist_changed:
+        refresh_gaps(s, ws, cluster)
+        follow_twist(s, ws, cluster)
     # A state that is not finite would be integrated in the finest steps, which takes a second.
     while time < duration - 1e-12 and is_finite(q) and is_finite(v):
         left, seek = duration - time, impacts < max_impacts

@@ -67,14 +67,15 @@ STEP_STATS = np.dtype([
     ('ended_without_impact', np.int64), ('last_dt', float), ('next_dt', float),
     ('work_pushes', float), ('work_grabs', float), ('work_position_correction', float),
     ('energy_removed', float), ('energy_unremoved', float), ('gaps_current', np.int64),
-    ('flights_cut', np.int64), ('ledger', LEDGER)], align=True)
+    ('twist_changed', np.int64), ('flights_cut', np.int64), ('ledger', LEDGER)], align=True)
 """Since the start: flight steps, contact steps, impacts, Gauss-Seidel sweeps; islands that stayed
 unsolved, contacts dropped for want of space, searches for a time of impact that failed, impacts
 whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last
 step: its contacts, whether it ended without an impact, its length and the longest that the next may
 have, s (0: any). Work of pushes, of grabs, and of position correction beyond its share of the
 kinetic energy, J. Spurious energy gained in steps, J: removed from the motion, and left, where
-nothing moved. ``gaps_current``: whether the gaps are those at q. ``flights_cut``: ticks, or parts
+nothing moved. ``gaps_current``: whether the gaps are those at q. ``twist_changed``: whether a
+kinematic body has another velocity than in the last step. ``flights_cut``: ticks, or parts
 of them, in which flight steps reached their bound. ``ledger``: see above."""
 
 ClusterState = collections.namedtuple(

@@ -61,6 +61,7 @@ def _kinematic_tree(scene: Scene) -> np.ndarray:
             body['mass'], body['inertia'] = bone.mass, bone.inertia
             body['inertial_orientation'] = bone.orientation
             body['q_start'], body['v_start'] = q, v
+            body['kinematic'] = placement.is_kinematic
             at[bone.name] = len(bodies)
             bodies.append(body)
             if joint is None:
@@ -81,8 +82,12 @@ def _enter_joint(body: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, in
 
 
 def _energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) -> np.ndarray:
-    """Energy scale m g L (1,), J: m of all bodies, L the largest reach of a geom."""
-    return np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*gravity)])
+    """Energy scale m g L (1,), J: m of all bodies, L the largest reach of a geom; of those that
+    gravity moves.
+    """
+    falls = tree['kinematic'] == 0
+    reach = geoms['reach'][falls[geoms['body']]].max(initial=0.0)
+    return np.array([tree['mass'][falls].sum() * reach * math.hypot(*gravity)])
 
 
 def join_systems(systems: Sequence[System], pairs: np.ndarray,
@@ -188,6 +193,8 @@ def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
         geom['reach'] = geom['bounding_radius'] + math.hypot(*part.position)
         law = contact_law(np.array(scene.material.on(bone)), base)
         geom['friction'], geom['rolling_friction'], geom['restitution'] = law
+        # What does not yield has nothing to do with the ground.
+        count = 0 if tree['kinematic'][geom['body']] else count
         geom['first_point'], geom['point_count'] = first, count
         first += count
     return geoms

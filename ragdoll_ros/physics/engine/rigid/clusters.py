@@ -77,6 +77,8 @@ class Clusters:
     def __init__(self, scene: Scene, layout: DofLayout, workers: int) -> None:
         self._scene = scene
         self._systems, self._laws = _each_doll(scene)
+        self._kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
+        """(d,) dolls that set_velocities() leaves as they are."""
         self._q = [np.arange(own.start, own.stop) for own in layout.doll_q]
         self._v = [np.arange(own.start, own.stop) for own in layout.doll_v]
         self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
@@ -167,14 +169,29 @@ class Clusters:
                 self._scatter_state(cluster)
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
-        """Set the velocities of ``dolls`` (d,), whole clusters, to those in ``velocities``."""
-        own = dolls[self._doll_of_v]
+        """Set the velocities of ``dolls`` (d,), whole clusters, to those in ``velocities``, but for
+        those of kinematic ones.
+        """
+        own = (dolls & ~self._kinematic)[self._doll_of_v]
         self.v[own] = velocities[own]
         self._states.arrays['dense_step'][dolls] = 0
         for cluster in self._joined:
             if dolls[cluster.dolls[0]]:
-                cluster.state.v[:] = velocities[cluster.v_indices]
+                cluster.state.v[:] = self.v[cluster.v_indices]
                 cluster.state.dense_step[:] = 0
+
+    def set_twist(self, doll: int, v: np.ndarray) -> None:
+        """Set the velocities of a doll to its own in those of the scene (nv,); the contacts of its
+        cluster are kept.
+        """
+        self.v[self._v[doll]] = v[self._v[doll]]
+        cluster = self.members[self.of_doll[doll]]
+        cluster.state.v[:] = self.v[cluster.v_indices]
+        cluster.state.dense_step[:] = 0
+
+    def follow_twist(self, doll: int) -> None:
+        """Let what a doll touches follow its new twist when its cluster is advanced."""
+        self.members[self.of_doll[doll]].state.stats['twist_changed'] = 1
 
     def set_doll(self, doll: int, q: np.ndarray, v: np.ndarray) -> None:
         """Set the coordinates and velocities of a doll to its own in those of the scene (nq,),
@@ -534,12 +551,13 @@ def _each_doll(scene: Scene) -> tuple[list[System], list[np.ndarray]]:
     """The system of each doll by itself, and the contact laws of its geoms; equal dolls share
     theirs.
     """
-    made: dict[int, tuple[System, np.ndarray]] = {}
-    for placement in scene.dolls:
-        if id(placement.doll) not in made:
+    made: dict[tuple[int, bool], tuple[System, np.ndarray]] = {}
+    keys = [(id(placement.doll), placement.is_kinematic) for placement in scene.dolls]
+    for key, placement in zip(keys, scene.dolls, strict=True):
+        if key not in made:
             alone = dataclasses.replace(scene, dolls=(placement,), bodies=())
-            made[id(placement.doll)] = build_system(alone), contact_laws(alone)
-    each = [made[id(placement.doll)] for placement in scene.dolls]
+            made[key] = build_system(alone), contact_laws(alone)
+    each = [made[key] for key in keys]
     return [system for system, _ in each], [laws for _, laws in each]
 
 

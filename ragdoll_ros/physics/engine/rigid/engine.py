@@ -41,6 +41,7 @@ class RigidEngine:
 
     energy_error = 1e-2
     supports_joint_springs = True
+    moves_bodies = True
     simulates_copies = True
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
@@ -50,6 +51,11 @@ class RigidEngine:
         self._broad_phase = BroadPhase(scene, self._clusters.reach())
         self._heights = GroundHeights(scene)
         self._spins = self.layout.root_angular_velocities
+        self._kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
+        """(d,)"""
+        self._some_kinematic = bool(self._kinematic.any())
+        self._twisted: set[int] = set()
+        """Dolls whose twist has been set since the last interval."""
         self.sleeping = np.zeros(len(scene.dolls), bool)
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]
@@ -111,6 +117,17 @@ class RigidEngine:
         self._last_start = None
         clusters.add_work(self.doll_totals.energy - before)
 
+    def set_twist(self, doll: int, velocity: np.ndarray, spin: np.ndarray) -> None:
+        coordinates, layout = self.coordinates, self.layout
+        coordinates.v[layout.root_velocities[doll]] = velocity
+        coordinates.v[layout.root_angular_velocities[doll]] = spin
+        own = self.cluster_of_doll == self.cluster_of_doll[doll]
+        self._wake(own)
+        self._clusters.set_twist(doll, self._in_root_axes(coordinates))
+        self._clusters.advance(0.0, self.accuracy, ~own)
+        self._update_state()
+        self._twisted.add(doll)
+
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
         clusters, actions = self._clusters, (wrenches, springs, drives)
@@ -119,6 +136,9 @@ class RigidEngine:
         for acts in (*wrenches, *springs, *drives):
             self._wake(of_doll == of_doll[self.scene.doll_of_bone[acts.bone]])
         self._update_clusters(duration)
+        for doll in self._twisted:
+            clusters.follow_twist(doll)
+        self._twisted.clear()
         self._advance(duration, actions, self.accuracy)
 
     def overlaps(self, coordinates: GeneralizedState) -> tuple[Overlap, ...]:
@@ -168,7 +188,7 @@ class RigidEngine:
         found = np.zeros(len(self.scene.dolls), bool)
         on = (bones[:, 1] == GROUND) & (contacts['impulse'][:, 0] > 0)
         found[self.scene.doll_of_bone[bones[on, 0]]] = True
-        return found
+        return found | self._kinematic
 
     def contacts(self) -> Contacts:
         found, touching, dt = self._clusters.contacts()
@@ -239,7 +259,8 @@ class RigidEngine:
         """
         clusters = self._clusters
         pairs = self._pairs_to_form(duration) if len(self.scene.dolls) > 1 else None
-        found_others = clusters.static_geoms.update(clusters.bone_states, duration, ~self.sleeping)
+        found_others = clusters.static_geoms.update(clusters.bone_states, duration,
+                                                     ~(self.sleeping | self._kinematic))
         if pairs is not None:
             clusters.form(pairs)
             self._age = 0
@@ -271,8 +292,10 @@ class RigidEngine:
 
     def _near_pairs(self, ahead: float) -> np.ndarray:
         """Pairs (k, 2) of dolls that may touch within ``ahead`` s, one of each awake."""
-        return self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
-                                       self.cluster_of_doll)
+        found = self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
+                                        self.cluster_of_doll)
+        # Bodies that do not yield have no contacts with each other.
+        return found[~self._kinematic[found].all(axis=1)] if self._some_kinematic else found
 
     def _advance(self, duration: float, actions: tuple[Wrenches, Springs, Drives],
                  accuracy: Accuracy) -> None:
@@ -293,7 +316,10 @@ class RigidEngine:
         acts: dict[int, tuple[list, list, list]] = {}
         for kind, given in enumerate(actions):
             for one in given:
-                place = int(self._clusters.of_doll[self.scene.doll_of_bone[one.bone]])
+                doll = self.scene.doll_of_bone[one.bone]
+                if self._kinematic[doll]:
+                    continue
+                place = int(self._clusters.of_doll[doll])
                 acts.setdefault(place, ([], [], []))[kind].append(one)
         acted = []
         for place, (loads, springs, drives) in acts.items():
@@ -323,7 +349,7 @@ class RigidEngine:
             return
         depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
-        sunk = depths > allowed_penetration(self.scene)
+        sunk = (depths > allowed_penetration(self.scene)) & ~self._kinematic
         for doll in (doll for doll in dolls if sunk[doll]):
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)

@@ -36,6 +36,7 @@ class SubsteppedEngine(ABC):
     """
 
     supports_joint_springs = False
+    moves_bodies = False
     simulates_copies = False
 
     lags = True

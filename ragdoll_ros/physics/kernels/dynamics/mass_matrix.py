@@ -45,10 +45,18 @@ def composite_inertias(tree: np.ndarray, kin: Kinematics, composite: np.ndarray)
 def mass_matrix(tree: np.ndarray, dof_parent: np.ndarray, dof_body: np.ndarray, kin: Kinematics,
                 dyn: Dynamics) -> None:
     """Write the mass matrix to the lower triangle of dyn.H, where it is not zero by structure, and
-    dyn.composite_inertias. ``kin`` has all motion subspaces, also the roots', and inertias.
+    dyn.composite_inertias. ``kin`` has all motion subspaces, also the roots', and inertias. That of
+    kinematic bodies is infinite, so that no force or impulse changes their velocities.
     """
     composite_inertias(tree, kin, dyn.composite_inertias)
     for d in range(len(dof_parent)):
+        if tree[dof_body[d]].kinematic:
+            j = dof_parent[d]
+            dyn.H[d, d] = math.inf
+            while j >= 0:
+                dyn.H[d, j] = 0.0
+                j = dof_parent[j]
+            continue
         axis, subtree = kin.motion_subspaces[d], dyn.composite_inertias[dof_body[d]]
         wx, wy, wz = vec(axis)
         vx, vy, vz = linear(axis)

@@ -41,13 +41,15 @@ resting face differ by as much, and the impulses to level them would be determin
 
 @compiled
 def label_islands(s: System, ws: Workspace, m: int) -> None:
-    """Write the island of each of m contacts, the least index of its dolls, to found[].island."""
+    """Write the island of each of m contacts, the least index of its dolls, to found[].island.
+    What touches a kinematic body is not joined by it.
+    """
     label, contacts = ws.island.label, ws.contacts.found
     for d in range(len(label)):
         label[d] = d
     for i in range(m):
         c = contacts[i]
-        if c.body_b >= 0:
+        if c.body_b >= 0 and not s.tree[c.body_a].kinematic and not s.tree[c.body_b].kinematic:
             a, b = label[s.body_doll[c.body_a]], label[s.body_doll[c.body_b]]
             if a != b:
                 low, high = min(a, b), max(a, b)
@@ -55,7 +57,9 @@ def label_islands(s: System, ws: Workspace, m: int) -> None:
                     if label[d] == high:
                         label[d] = low
     for i in range(m):
-        contacts[i].island = label[s.body_doll[contacts[i].body_a]]
+        c = contacts[i]
+        moved = c.body_b if s.tree[c.body_a].kinematic and c.body_b >= 0 else c.body_a
+        c.island = label[s.body_doll[moved]]
 
 
 @compiled
@@ -149,7 +153,7 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
         c.normal_velocity = was[row]
         bounces = c.restitution > 0 and c.normal_velocity < -s.restitution_speed[0]
         if h == 0.0:
-            if bounces:
+            if bounces and not ws.stats[0].twist_changed:
                 b[row] += c.restitution * c.normal_velocity
                 has_restitution = True
         elif c.persistent:

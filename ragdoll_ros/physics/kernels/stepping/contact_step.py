@@ -32,7 +32,7 @@ from .position_correction import (clip_to_joint_limits, correction_energy, write
                                   limit_correction_energy)
 from .springs import add_implicit_stiffness, add_spring_force, saturate_springs, theta_weight
 from .warm_start import warm_start
-from .work import account_work, load_potential
+from .work import account_kinematic_work, account_work, load_potential
 
 STEP_TOLERANCE = 1e-8
 """m/s to which contacts are solved."""
@@ -202,8 +202,9 @@ def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since
     ground; write contacts.gaps_end and step.sums_after. step.end becomes the kinematics of the end.
     """
     step, kin, q, v = ws.step, ws.step.end, ws.step.q_end, ws.step.v_end
-    clear_external(step.external)
+    clear_external(s, step.external)
     add_contact_impulses(s, ws, m)
+    account_kinematic_work(s, ws, step.middle, step.q_middle, m)
     if len(cluster.loads) or len(cluster.springs):
         account_work(s, ws, cluster.v, v, h, cluster.loads, cluster.springs, since)
     forward_kinematics(s.tree, q, v, kin)
@@ -227,10 +228,13 @@ def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since
 
 
 @compiled
-def clear_external(external: np.ndarray) -> None:
-    """Set impulses, moments and flags of all dolls (d,) to zero."""
+def clear_external(s: System, external: np.ndarray) -> None:
+    """Set impulses, moments and flags of all dolls (d,) to zero; kinematic ones are borne."""
     for d in range(len(external)):
         own = external[d]
         own.on_ground = own.touches_other = 0
         for k in range(3):
             own.impulse[k] = own.moment[k] = 0.0
+    for i in range(len(s.tree)):
+        if s.tree[i].kinematic:
+            external[s.body_doll[i]].on_ground = 1

@@ -17,6 +17,7 @@ from ..impulses.solve_contacts import solve_contacts
 from ..system import System
 from ..workspace import Workspace
 from .momentum import count_contact_impulses
+from .work import account_kinematic_work
 
 TOLERANCE = 1e-10
 """m/s: tolerance of the contact solve."""
@@ -52,6 +53,17 @@ def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m
 
 
 @compiled
+def follow_twist(s: System, ws: Workspace, cluster: ClusterState) -> None:
+    """Where a kinematic body has another velocity than in the last step, let what touches it follow
+    at once, without restitution: its velocity is a sample of a motion that is none of impacts.
+    ws.gaps are current.
+    """
+    if ws.stats[0].twist_changed:
+        impact(s, ws, cluster)
+        ws.stats[0].twist_changed = 0
+
+
+@compiled
 def impact(s: System, ws: Workspace, cluster: ClusterState) -> int:
     """Add to cluster.v the change by the impulses of everything that has met at q by ws.gaps.
     Returns how many contacts that touch were left out.
@@ -76,5 +88,6 @@ def impact(s: System, ws: Workspace, cluster: ClusterState) -> int:
     for j in range(len(v)):
         v[j] += ws.step.v_change[j]
     count_contact_impulses(s, ws, m, cluster.contact_impulses)
+    account_kinematic_work(s, ws, kin, q, m)
     ws.stats[0].impacts += 1
     return touching - m

@@ -28,7 +28,9 @@ REMOVABLE = 0.01
 
 @compiled
 def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.ndarray) -> None:
-    """Write the sums over each doll to ``out`` (d,); ``kin``: of q, its inertias are updated."""
+    """Write the sums over each doll to ``out`` (d,); ``kin``: of q, its inertias are updated. What
+    moves a kinematic body keeps its energy, which counts as zero.
+    """
     rotate_inertias(s.tree, kin, ws.step.dynamics.matrix)
     for d in range(len(out)):
         doll = out[d]
@@ -48,6 +50,9 @@ def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.
     for d in range(len(out)):
         doll = out[d]
         doll.energy = doll.kinetic - s.doll_masses[d] * dot(vec(doll.center), vec(s.gravity))
+    for i in range(len(s.tree)):
+        if s.tree[i].kinematic:
+            out[s.body_doll[i]].energy = out[s.body_doll[i]].kinetic = 0.0
 
 
 @compiled
@@ -90,10 +95,16 @@ def add_impulse(external: np.record, share: float, at: Vec3, impulse: Vec3) -> N
 
 
 @compiled
+def is_borne(s: System, c: np.record) -> bool:
+    """Whether one side of a contact does not yield: the WORLD, or a kinematic body."""
+    return c.body_b < 0 or s.tree[c.body_a].kinematic != 0 or s.tree[c.body_b].kinematic != 0
+
+
+@compiled
 def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
     """Of m contacts, add the impulses of those between dolls to step.external, moments about the
-    world's origin, and set its flags: which dolls the ground bears (a contact with an impulse), and
-    which touch another.
+    world's origin, and set its flags: which dolls the ground bears, or a kinematic body (a contact
+    with an impulse), and which touch another.
     """
     external = ws.step.external
     for n in range(m):
@@ -101,9 +112,11 @@ def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
         if c.kind == LIMIT:
             continue
         p, one = c.impulse, s.body_doll[c.body_a]
-        if c.body_b < 0:
+        if is_borne(s, c):
             if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:  # friction without limit needs no normal
                 external[one].on_ground = 1
+                if c.body_b >= 0:
+                    external[s.body_doll[c.body_b]].on_ground = 1
             continue
         other = s.body_doll[c.body_b]
         if one == other:
@@ -201,6 +214,8 @@ def remove_energy(s: System, ws: Workspace, gained: float, q: np.ndarray, v: np.
     for i in range(len(s.tree)):
         body, d = s.tree[i], s.body_doll[i]
         at, dof = body.q_start, body.v_start
+        if body.kinematic:
+            continue
         if body.parent >= 0 or ws.step.external[d].on_ground:
             for k in range(body.dof_count if body.parent >= 0 else 6):
                 v[dof + k] *= share

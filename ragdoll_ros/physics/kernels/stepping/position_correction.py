@@ -14,7 +14,7 @@ from ..dynamics.kinematics import Kinematics, body_velocity, linear, update_velo
 from ..maths.vectors import add, cross, dot, norm, scale, vec
 from ..system import System
 from ..workspace import Workspace
-from .momentum import internal_kinetic_energy
+from .momentum import internal_kinetic_energy, is_borne
 
 PAID_SHARE = 0.005
 """Share of the internal kinetic energy that position correction may add in a step."""
@@ -38,13 +38,15 @@ def correction_energy(s: System, ws: Workspace, kin: Kinematics, correction: np.
 @compiled
 def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.ndarray) -> None:
     """Scale a displacement ``correction`` (nv,), and its scalars.correction_energy, so that this
-    stays below a share of the internal kinetic energy. Deep penetrations into the ground or past a
-    limit are corrected at any cost; the excess is added to stats.work_position_correction.
+    stays below a share of the internal kinetic energy. Deep penetrations into what does not yield
+    or past a limit are corrected at any cost; the excess is added to
+    stats.work_position_correction.
     """
     is_deep, scalars = False, ws.step.scalars[0]
     for i in range(m):
         c = ws.contacts.found[i]
-        is_deep |= c.body_b < 0 and c.gap < -(BEYOND_LIMIT if c.kind == LIMIT else DEEP_PENETRATION)
+        is_deep |= is_borne(s, c) and c.gap < -(
+            BEYOND_LIMIT if c.kind == LIMIT else DEEP_PENETRATION)
     paid = PAID_SHARE * max(0.0, internal_kinetic_energy(s, ws))
     if scalars.correction_energy <= paid:
         return

@@ -1,13 +1,14 @@
-"""Work, impulse and moment of pushes, grabs and drives in a step."""
+"""Work, impulse and moment of pushes, grabs and drives in a step; work of kinematic bodies."""
 from __future__ import annotations
 
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..contact_kind import LIMIT, ROLLING
 from ..dynamics.kinematics import (Kinematics, forward_kinematics, point_of_body,
                                    root_motion_subspaces, root_position, velocity_at)
 from ..dynamics.loads import ANGULAR_DRIVE, GRAB, JOINT_SPRING, load_in_world
-from ..maths.vectors import add, dot, put, scale, vec
+from ..maths.vectors import add, dot, put, scale, sub, vec
 from ..system import System
 from ..workspace import Workspace
 from .momentum import add_impulse
@@ -46,6 +47,30 @@ def account_work(s: System, ws: Workspace, v: np.ndarray, v_end: np.ndarray, h: 
             arm = point_of_body(s.tree[i], kin, i, spring.point)
             at = add(root_position(q, s.tree[s.body_root[i]].q_start), arm)
             add_impulse(external, h, at, force)
+
+
+@compiled
+def account_kinematic_work(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
+                           m: int) -> None:
+    """Add the work, J, that kinematic bodies do by the impulses of m contacts found at q to
+    stats.work_pushes. ``kin``: of q, with their velocities.
+    """
+    for n in range(m):
+        c = ws.contacts.found[n]
+        if c.kind == LIMIT:
+            continue
+        p, t, w = c.impulse, vec(c.tangents[0]), vec(c.tangents[1])
+        for side in range(2 if c.body_b >= 0 else 1):
+            i, sign = (c.body_a, -1.0) if side == 0 else (c.body_b, 1.0)
+            if not s.tree[i].kinematic:
+                continue
+            root, turn = root_position(q, s.tree[i].q_start), vec(kin.spatial_velocities[i])
+            at_friction = velocity_at(kin, i, sub(vec(c.friction_point), root))
+            work = (p[0] * dot(vec(c.normal), velocity_at(kin, i, sub(vec(c.point), root)))
+                    + p[1] * dot(t, at_friction) + p[2] * dot(w, at_friction))
+            if c.kind == ROLLING:
+                work += p[3] * dot(t, turn) + p[4] * dot(w, turn)
+            ws.stats[0].work_pushes += sign * work
 
 
 @compiled

@@ -1,0 +1,249 @@
+"""DrivenBodies: the motions of bodies with `follow`, from the last pose and twist of each.
+
+A motion goes on at constant twist for TIMEOUT, then the body stands. What follows exactly reaches
+the motion at the end of the tick in which it begins, and then moves with it. What gives way is
+pulled to it by a stiff drive, whose target velocity has a part in proportion to the distance.
+"""
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import errors, rotation
+from ...model.drive import MAX_SPEED
+from ...model.pose import Pose
+from ...model.scene import SECOND, Scene
+from ...model.state import State
+from ...model.vectors import clamp_norm, finite_floats, unit_vector
+from ..engine.protocol import AppliedDrive
+from .grab import checked_point
+
+TIMEOUT = SECOND // 5
+"""ns for which a body moves on after its last twist."""
+
+JUMP_SPEED = 10.0
+"""m/s: a pose that is farther away than this speed explains in a tick is a jump."""
+
+NEGLIGIBLE = 1e-9
+"""m or rad: a body that is this near to its motion has reached it."""
+
+DRIVE_TIME = 1e-3
+"""s in which a drive without limits would take up a difference of velocity."""
+
+CATCH_UP_TIME, CATCH_UP_SPEED = 0.1, 1.0
+"""s in which a body that gives way returns to its motion, and m/s or rad/s at most."""
+
+Twist = tuple[np.ndarray, np.ndarray]
+"""Velocity (3,) m/s and angular velocity (3,) rad/s, world frame."""
+
+AT_REST: Twist = np.zeros(3), np.zeros(3)
+
+
+@dataclass
+class _Motion:
+    """Motion of a body's frame at constant twist."""
+
+    pose: Pose
+    """At ``since``."""
+    twist: Twist
+    """Of the frame's origin."""
+    since: int
+    """ns"""
+    told: bool = False
+    """Whether anybody has asked for it."""
+    approach: Twist = AT_REST
+    """Of the bone, until ``approach_end``, ns."""
+    approach_end: int = -1
+
+    def at(self, time: int) -> Pose:
+        """Pose of the frame at ``time``, ns."""
+        gone = (min(time, self.end) - self.since) / SECOND
+        velocity, spin = self.twist
+        return Pose(self.pose.position + gone * velocity, rotation.multiply(
+            rotation.from_rotation_vector(gone * spin), self.pose.orientation))
+
+    @property
+    def end(self) -> int:
+        """Time, ns, from which on it stands."""
+        return self.since + TIMEOUT
+
+    def twist_at(self, time: int) -> Twist:
+        """Twist of the frame's origin at ``time``, ns."""
+        return self.twist if time < self.end else AT_REST
+
+
+class _Body:
+    """A body with `follow`, and its motion."""
+
+    def __init__(self, scene: Scene, doll: int, state: State) -> None:
+        self.placement, self.doll = scene.dolls[doll], doll
+        self.bone = scene.bone_slices[doll].start
+        self.shape_pose = self.placement.doll.root.pose
+        """Pose of the bone's center of mass and principal axes in the body's frame."""
+        self.reach = float(np.linalg.norm(self.placement.doll.root.shape.half_extents))
+        self.jumps = 0
+        self.engine_twist: Twist | None = None
+        """The twist of the bone that the engine has."""
+        self.hold(state, 0)
+
+    def hold(self, state: State, time: int) -> None:
+        """Stand where it is, from ``time``, ns, on."""
+        self.motion = _Motion(self._frame(state), AT_REST, time - TIMEOUT)
+        self.engine_twist = None
+
+    def drive(self, pose: Pose | None, twist: Twist, time: int, tick: int,
+              state: State) -> Pose | None:
+        """Begin a motion at ``time``. Returns the pose of the bone where it jumps to, if so."""
+        follows, before = self.placement.follow, self.motion
+        here = self._frame(state) if follows and follows.is_exact else before.at(time)
+        self.motion = _Motion(pose or here, twist, time, True)
+        off = self._distance(here, self.motion.pose)
+        if off > JUMP_SPEED * tick / SECOND:
+            self.jumps += before.told
+            return self.motion.pose.compose(self.shape_pose)
+        if self.placement.is_kinematic and off > NEGLIGIBLE:
+            end, seconds = self.motion.at(time + tick).compose(self.shape_pose), tick / SECOND
+            turn = rotation.multiply(end.orientation, rotation.inverse(
+                state.orientations[self.bone]))
+            self.motion.approach = ((end.position - state.positions[self.bone]) / seconds,
+                                    rotation.rotation_vector(turn) / seconds)
+            self.motion.approach_end = time + tick
+        return None
+
+    def twist(self, time: int, end: int) -> Twist:
+        """Mean twist of the bone of a body that follows exactly, from ``time`` to ``end``, ns."""
+        motion = self.motion
+        if time < motion.approach_end:
+            return motion.approach
+        velocity, spin = motion.twist_at(time)
+        arm = self.shape_pose.position
+        if spin.any() and arm.any():
+            before, after = (rotation.rotate(motion.at(t).orientation, arm) for t in (time, end))
+            velocity = velocity + (after - before) * (SECOND / (end - time))
+        return velocity, spin
+
+    def moves(self, time: int) -> bool:
+        """Whether it is on its way."""
+        motion = self.motion
+        if not self.placement.is_kinematic:
+            return motion.told and time < motion.end
+        return time < motion.approach_end or any(each.any() for each in motion.twist_at(time))
+
+    def applied_drive(self, time: int, state: State) -> AppliedDrive:
+        """The drive that pulls a body that gives way towards its motion."""
+        due, bone = self.motion.at(time), self.placement.doll.root
+        velocity, spin = self.motion.twist_at(time)
+        center = due.compose(self.shape_pose)
+        turn = rotation.multiply(center.orientation,
+                                 rotation.inverse(state.orientations[self.bone]))
+        targets = (
+            velocity + np.cross(spin, center.position - due.position)
+            + _catch_up(center.position - state.positions[self.bone]),
+            spin + _catch_up(rotation.rotation_vector(turn)))
+        follow = self.placement.follow
+        return AppliedDrive(self.bone, np.array(targets),
+                            (bone.mass / DRIVE_TIME, max(bone.inertia) / DRIVE_TIME),
+                            (follow.max_force, follow.max_torque))
+
+    def _frame(self, state: State) -> Pose:
+        """Pose of the body's frame in a state."""
+        return Pose(state.positions[self.bone], state.orientations[self.bone]).compose(
+            self.shape_pose.relative(Pose()))
+
+    def _distance(self, a: Pose, b: Pose) -> float:
+        """Bound, m, on the distance of a point of the body at two poses."""
+        turn = float(rotation.angle_between(a.orientation, b.orientation))
+        return float(np.linalg.norm(a.position - b.position)) + turn * self.reach
+
+
+class DrivenBodies:
+    """All bodies of a scene with `follow`. Times in ns."""
+
+    def __init__(self, scene: Scene, state: State) -> None:
+        self._bodies = {placement.name: _Body(scene, doll, state)
+                        for doll, placement in enumerate(scene.dolls) if placement.follow}
+        self._exact = [body for body in self._bodies.values() if body.placement.is_kinematic]
+        self._limited = [body for body in self._bodies.values()
+                         if not body.placement.is_kinematic]
+
+    def __len__(self) -> int:
+        return len(self._bodies)
+
+    @property
+    def jumps(self) -> int:
+        """Jumps of all bodies since the start."""
+        return sum(body.jumps for body in self._bodies.values())
+
+    def stale(self, time: int) -> tuple[str, ...]:
+        """Names of the bodies that have no motion any more, or none yet."""
+        return tuple(name for name, body in self._bodies.items() if time >= body.motion.end)
+
+    def drive(self, name: str, pose: Sequence[float] | None, twist: Sequence[float], time: int,
+              tick: int, state: State) -> tuple[int, Pose] | None:
+        """Begin a motion; see Simulation.drive_body(). Returns the doll and the pose of its bone if
+        it jumps there.
+        """
+        if name not in self._bodies:
+            expected = errors.one_of(list(self._bodies), name) if self._bodies else (
+                'a body with follow; the scene has none')
+            raise errors.UnknownDoll('name', name, expected)
+        motion = None if pose is None else _checked_pose(pose)
+        body = self._bodies[name]
+        jump = body.drive(motion, _checked_twist(twist), time, tick, state)
+        return None if jump is None else (body.doll, jump)
+
+    def hold(self, doll: int, state: State, time: int) -> None:
+        """Let a doll, if it is one of these bodies, stand where it is."""
+        for body in self._bodies.values():
+            if body.doll == doll:
+                body.hold(state, time)
+
+    def forget_twists(self) -> None:
+        """The engine's twists are not those that were set: another state was restored."""
+        for body in self._exact:
+            body.engine_twist = None
+
+    def twists(self, time: int, end: int) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """Dolls that follow exactly with their twists until ``end``, if these have changed."""
+        for body in self._exact:
+            twist = body.twist(time, end)
+            if body.engine_twist is None or not all(map(np.array_equal, twist, body.engine_twist)):
+                body.engine_twist = twist
+                yield body.doll, *twist
+
+    def drives(self, time: int, state: State, sleeping: np.ndarray) -> list[AppliedDrive]:
+        """Drives of the bodies that give way; none of those that sleep where they stand."""
+        return [body.applied_drive(time, state) for body in self._limited
+                if body.moves(time) or not sleeping[body.doll]]
+
+    def moving_bones(self, time: int) -> list[int]:
+        """Indices of the bones of bodies that are on their way."""
+        return [body.bone for body in self._bodies.values() if body.moves(time)]
+
+    def next_change(self, time: int, end: int) -> int:
+        """Time, until ``end``, at which a motion changes."""
+        times = [at for body in self._bodies.values()
+                 for at in (body.motion.approach_end, body.motion.end)]
+        return min((at for at in times if at > time), default=end)
+
+
+def _catch_up(missing: np.ndarray) -> np.ndarray:
+    """Velocity (3,) towards what is ``missing``, m or rad."""
+    return np.array(clamp_norm((missing / CATCH_UP_TIME).tolist(), CATCH_UP_SPEED)[0])
+
+
+def _checked_pose(values: Sequence[float]) -> Pose:
+    numbers = finite_floats('pose', values, 7)
+    return Pose(np.array(checked_point('pose', numbers[:3])), np.array(unit_vector(
+        'pose', numbers[3:], 'a quaternion x, y, z, w, not zero', 4)))
+
+
+def _checked_twist(values: Sequence[float]) -> Twist:
+    twist = np.array(finite_floats('twist', values, 6))
+    for part in (twist[:3], twist[3:]):
+        if np.linalg.norm(part) > MAX_SPEED:
+            raise errors.OutOfRange('twist', tuple(twist.tolist()),
+                                    f'at most {MAX_SPEED:g} m/s and rad/s')
+    return twist[:3], twist[3:]

@@ -1,0 +1,157 @@
+"""Bodies with `follow`: contacts with what moves follow closed forms, and its work is counted."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ragdoll_ros import (
+    Bone,
+    Box,
+    Follow,
+    Placement,
+    Ragdoll,
+    Scene,
+    Simulation,
+    Sphere,
+)
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.scene import Material
+
+pytest.importorskip('numba')
+
+ACCURACIES = ('draft', 'normal', 'exact')
+EXACT = Follow()
+G = 9.8
+
+
+def body(name, shape, mass=1.0, **start):
+    """A placement of one bone."""
+    return Placement(Ragdoll(name, (Bone(name, shape, mass, (0, 0, 0)),)), **start)
+
+
+def scene(*placements, ground=None, gravity=0.0, **material):
+    return Scene('world', placements, ground, Material(**{'friction': 0.0} | material),
+                 gravity=(0, 0, -gravity))
+
+
+def wall(name, x):
+    return body(name, Box((0.2, 2, 2)), position=(x, 0, 0), follow=EXACT)
+
+
+def run(simulation, seconds, **velocities):
+    """States (t, n, 13) while bodies are driven at these velocities along x."""
+    rows = []
+    for _ in range(round(seconds / simulation.step)):
+        for name, speed in velocities.items():
+            simulation.drive_body(name, twist=(speed, 0, 0, 0, 0, 0))
+        rows.append(simulation.advance().rows.copy())
+    return np.array(rows)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_a_ball_between_walls_that_approach_gains_twice_their_speed_at_each(accuracy):
+    """Faces at -1 and 1 m approach at u = 0.5 m/s; e = 1."""
+    speed, u, radius = 3.0, 0.5, 0.1
+    made = scene(body('ball', Sphere(radius), velocity=(speed, 0, 0)), wall('left', -1.1),
+                 wall('right', 1.1), restitution=1.0)
+    with Simulation(made, accuracy=accuracy) as simulation:
+        rows = run(simulation, 1.2, left=u, right=-u)
+        excess, (work, _) = simulation.energy_excess, simulation.work
+    time, place, side = 0.0, 0.0, 1.0
+    while True:
+        # The gap to the wall at +-(1 - u t) closes at speed + u.
+        there = time + (1 - u * time - radius - side * place) / (speed + u)
+        if there > 1.2:
+            break
+        place += side * speed * (there - time)
+        time, speed, side = there, speed + 2 * u, -side
+    assert speed > 5
+    # Impacts miss their velocity by IMPACT_COMPLIANCE, 1e-10 of it.
+    assert rows[-1, 0, 7] == pytest.approx(side * speed, abs=1e-8)
+    assert rows[-1, 0, 0] == pytest.approx(place + side * speed * (1.2 - time), abs=1e-8)
+    assert work == pytest.approx((speed ** 2 - 9) / 2, rel=1e-8)
+    assert abs(excess) < 1e-8 * work
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+@pytest.mark.parametrize('mass', [0.01, 100.0])
+def test_a_bat_gives_a_ball_its_speed_and_e_times_it(accuracy, mass):
+    """It is (1 + e) u, whatever the ball's mass; the bat goes on. It does m u v' of work, of which
+    impact takes m (1 - e^2) u^2 / 2.
+    """
+    u, e = 2.0, 0.6
+    made = scene(body('ball', Sphere(0.1), mass, position=(0.33, 0, 0)), wall('bat', -0.1),
+                 restitution=e)
+    with Simulation(made, accuracy=accuracy) as simulation:
+        rows = run(simulation, 0.3, bat=u)
+        excess, (work, _) = simulation.energy_excess, simulation.work
+        impulse = simulation.contact_impulses[0, 0]
+    assert rows[-1, 0, 7] == pytest.approx((1 + e) * u, abs=1e-8)
+    assert rows[:, 1, 7] == pytest.approx(u, abs=1e-12)
+    assert rows[-1, 1, 0] == pytest.approx(-0.1 + u * 0.3, abs=1e-12)
+    # It meets the ball after 0.23 m / u.
+    assert rows[-1, 0, 0] == pytest.approx(0.33 + (1 + e) * u * (0.3 - 0.115), abs=1e-8)
+    assert impulse == pytest.approx(mass * (1 + e) * u, rel=1e-8)
+    assert work == pytest.approx(impulse * u, rel=1e-8)
+    assert excess == pytest.approx(-mass * (1 - e * e) * u * u / 2, rel=1e-6)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_a_box_on_a_conveyor_reaches_its_speed_as_coulomb_says(accuracy):
+    """After u / mu g, with u^2 / 2 mu g of slip; the belt does m u^2 of work, half of it heat."""
+    u, mu, mass = 1.5, 0.4, 3.0
+    belt = body('belt', Box((8, 2, 0.2)), position=(0, 0, -0.1), follow=EXACT)
+    made = scene(body('box', Box((0.2, 0.3, 0.2)), mass, position=(0, 0, 0.1)), belt, gravity=G,
+                 friction=mu, restitution=0.0)
+    with Simulation(made, accuracy=accuracy) as simulation:
+        rows = run(simulation, 0.8, belt=u)
+        excess, (work, _) = simulation.energy_excess, simulation.work
+    assert rows[19, 0, 7] == pytest.approx(mu * G * 0.2, rel=1e-4)
+    assert rows[-1, 0, 7] == pytest.approx(u, abs=1e-6)
+    # It stops to slip within a step of order 2.
+    assert rows[-1, 0, 0] == pytest.approx(u * 0.8 - u * u / (2 * mu * G), rel=1e-5)
+    assert np.abs(rows[:, 0, [8, 9]]).max() < 1e-4
+    assert rows[-1, 0, 2] == pytest.approx(0.1, abs=1e-6)
+    assert work == pytest.approx(mass * u * u, rel=1e-8)
+    assert excess == pytest.approx(-mass * u * u / 2, rel=1e-6)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_a_lift_does_the_work_of_a_weight(accuracy):
+    """From rest to u at once, without a bounce, and up by 0.5 m: m u^2 and m g h, of which the
+    start takes half of the former.
+    """
+    u, mass, height = 0.5, 20.0, 0.5
+    lift = body('lift', Box((1, 1, 0.2)), position=(0, 0, -0.1), follow=EXACT)
+    made = scene(body('box', Box((0.4, 0.4, 0.4)), mass, position=(0, 0, 0.2)), lift, gravity=G,
+                 friction=0.5, restitution=0.5)
+    with Simulation(made, accuracy=accuracy) as simulation:
+        for _ in range(round(height / u / 0.01)):
+            simulation.drive_body('lift', twist=(0, 0, u, 0, 0, 0))
+            simulation.advance()
+        row, excess, (work, _) = simulation.state.rows[0], simulation.energy_excess, simulation.work
+    assert row[2] == pytest.approx(0.2 + height, abs=1e-6)
+    assert work == pytest.approx(mass * (G * height + u * u), rel=1e-9)
+    assert excess == pytest.approx(-mass * u * u / 2, rel=1e-6)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_a_turntable_carries_a_box_that_sticks_around(accuracy):
+    """A low box without slip moves on a circle, at angle w t and speed w r."""
+    w, r = 1.2, 0.5
+    table = body('table', Box((2, 2, 0.2)), position=(0, 0, -0.1), follow=EXACT)
+    made = scene(body('box', Box((0.2, 0.2, 0.1)), position=(r, 0, 0.05)), table, gravity=G,
+                 friction=math.inf, restitution=0.0)
+    with Simulation(made, accuracy=accuracy) as simulation:
+        for tick in range(100):
+            simulation.drive_body('table', twist=(0, 0, 0, 0, 0, w * min(1, tick / 20)))
+            simulation.advance()
+        row = simulation.state.rows[0]
+        turned = rotation.rotation_vector(simulation.state.orientations[1])[2]
+    assert turned == pytest.approx(w * (0.8 + 0.01 * np.arange(20).sum() / 20), abs=1e-9)
+    # The start is one of twenty jerks, each followed by a step of order 2.
+    assert math.hypot(*row[:2]) == pytest.approx(r, abs=1e-4)
+    assert math.atan2(row[1], row[0]) == pytest.approx(turned, abs=1e-4)
+    assert math.hypot(*row[7:9]) == pytest.approx(w * r, abs=1e-4)
