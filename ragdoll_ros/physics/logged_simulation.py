@@ -153,8 +153,8 @@ _ACTIONS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
-       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state',
-                    'drive_body')},
+       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state')},
+    'drive_body': lambda simulation, **arguments: simulation.drive_body(**arguments),
     'step': lambda simulation, step: setattr(simulation, 'step', step),
     'parts': lambda simulation, parts: setattr(simulation, 'samples_per_tick', parts),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),

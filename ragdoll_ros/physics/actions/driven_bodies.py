@@ -35,6 +35,9 @@ DRIVE_TIME = 1e-3
 CATCH_UP_TIME, CATCH_UP_SPEED = 0.1, 1.0
 """s in which a body that gives way returns to its motion, and m/s or rad/s at most."""
 
+LEASH = 0.02
+"""m by which a twist without a pose lets a motion get ahead of a body that gives way."""
+
 Twist = tuple[np.ndarray, np.ndarray]
 """Velocity (3,) m/s and angular velocity (3,) rad/s, world frame."""
 
@@ -96,13 +99,16 @@ class _Body:
     def drive(self, pose: Pose | None, twist: Twist, time: int, tick: int,
               state: State) -> Pose | None:
         """Begin a motion at ``time``. Returns the pose of the bone where it jumps to, if so."""
-        follows, before = self.placement.follow, self.motion
-        here = self._frame(state) if follows and follows.is_exact else before.at(time)
-        self.motion = _Motion(pose or here, twist, time, True)
-        off = self._distance(here, self.motion.pose)
+        before, here = self.motion, self._frame(state)
+        due = here if self.placement.is_kinematic else before.at(time)
+        self.motion = _Motion(
+            pose or (here if self._distance(due, here) > LEASH else due), twist, time, True)
+        if pose is None:
+            return None
+        off = self._distance(due, pose)
         if off > JUMP_SPEED * tick / SECOND:
             self.jumps += before.told
-            return self.motion.pose.compose(self.shape_pose)
+            return pose.compose(self.shape_pose)
         if self.placement.is_kinematic and off > NEGLIGIBLE:
             end, seconds = self.motion.at(time + tick).compose(self.shape_pose), tick / SECOND
             turn = rotation.multiply(end.orientation, rotation.inverse(
