@@ -1,5 +1,6 @@
 """README.md, CONTRIBUTING.md and docs/ say what is: their code runs, their commands exist."""
 import contextlib
+import dataclasses
 import functools
 import importlib
 import importlib.util
@@ -201,8 +202,13 @@ def test_falls_page_names_every_key_and_every_format():
 def test_measures_are_told_one_by_one():
     told = coded(table('docs/accuracy_explained.md', 'What the simulation reports about itself'))
     found = set()
-    for engine in ('auto', 'bullet'):
-        with ragdoll_ros.Simulation(ragdoll_ros.load_scene('drop'), engine=engine) as simulation:
+    drop = ragdoll_ros.load_scene('drop')
+    bone = ragdoll_ros.Bone('robot', ragdoll_ros.Sphere(0.1), 1.0, (0, 0, 0))
+    robot = ragdoll_ros.Placement(ragdoll_ros.Ragdoll('robot', (bone,)), position=(9, 0, 1),
+                                  follow=ragdoll_ros.Follow())
+    driven = dataclasses.replace(drop, dolls=(*drop.dolls, robot))
+    for scene, engine in ((driven, 'auto'), (drop, 'bullet')):
+        with ragdoll_ros.Simulation(scene, engine=engine) as simulation:
             found |= set(simulation.measures())
     assert told == found
 

@@ -21,8 +21,10 @@ ROS_OWN = re.compile('use_sim_time$|start_type_description_service$|qos_override
 """Parameters that rclpy declares for every node."""
 
 
-ABSENT = set() if TFMessage else {('/tf', 'out', 'tf2_msgs/TFMessage')}
-"""What is offered where tf2_msgs is installed."""
+ABSENT = {('/ragdoll/bodies/<name>/odom', 'in', 'nav_msgs/Odometry'),
+          ('/ragdoll/bodies/<name>/cmd_vel', 'in', 'geometry_msgs/Twist'),
+          *(() if TFMessage else {('/tf', 'out', 'tf2_msgs/TFMessage')})}
+"""What is offered in scenes with driven bodies, and where tf2_msgs is installed."""
 
 STANDARD = re.compile('simulation_interfaces/|/_action/')
 """What docs/simulation_interfaces.md has."""

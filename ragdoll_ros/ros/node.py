@@ -24,6 +24,7 @@ from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics, DuplicateNodes, overlaps_text
 from .event_log import EventLog
 from .imu.publishers import ImuPublishers
+from .inputs.body_subscriptions import BodySubscriptions
 from .inputs.input_counts import InputCounts
 from .inputs.interactive_marker_server import InteractiveMarkerServer
 from .inputs.state_subscription import StateSubscription
@@ -81,6 +82,7 @@ class RagdollNode(Node):
         self._event_log = EventLog(self)
         self.inputs = PushSubscriptions(self, self.input_counts)
         self.states = StateSubscription(self, self.input_counts, self._show_if_paused)
+        self.bodies = BodySubscriptions(self, self.input_counts, self._show_if_paused)
         self.interactive = InteractiveMarkerServer(self, self.input_counts, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
                                         self._diagnostic_values, self._diagnostics_stamp)
@@ -238,6 +240,7 @@ class RagdollNode(Node):
         """Connect a simulation and the current settings to all parts of the node."""
         self._event_log.set_simulation(simulation)
         self.simulation = self.inputs.simulation = self.states.simulation = simulation
+        self.bodies.simulation = simulation
         self._diagnostics.simulation = simulation
         self.inputs.settings = self.states.settings = self.settings
         self.recovery.set_simulation(simulation)

@@ -1,0 +1,102 @@
+"""Subscriptions that move bodies with `follow`: Odometry or a Twist becomes drive_body()."""
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+from ...model import errors, rotation
+from ...model.drive import MAX_SPEED
+from ...model.pose import Pose
+from ...model.scene import Placement
+from ...model.vectors import unit_vector
+from ...physics.simulation import Simulation
+from .input_counts import InputCounts
+from .subscriptions import limited
+
+
+class BodySubscriptions:
+    """Subscriptions to ~/bodies/<name>/odom and ~/bodies/<name>/cmd_vel, for each driven body.
+
+    A pose is that of the body's frame in the world frame, whatever the message calls its frames: a
+    robot's odometry has names of its own. Twists are along the body's axes, as nav_msgs and REP 103
+    have them. ``after`` is called when a body has been told how to move.
+    """
+
+    def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None]) -> None:
+        self._node, self._counts, self._after = node, counts, after
+        self._subscriptions: list[Subscription] = []
+        self._names: tuple[str, ...] = ()
+        self._simulation: Simulation
+
+    @property
+    def simulation(self) -> Simulation:
+        """Whose bodies are moved; the subscriptions are those of its scene."""
+        return self._simulation
+
+    @simulation.setter
+    def simulation(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        names = tuple(each.name for each in simulation.scene.dolls if each.follow)
+        if names == self._names:
+            return
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        self._names = names
+        self._subscriptions = [
+            self._node.create_subscription(kind, f'{body_topic(name)}/{end}',
+                                           partial(callback, name), 10)
+            for name in names
+            for kind, end, callback in ((Odometry, 'odom', self.on_odometry),
+                                        (Twist, 'cmd_vel', self.on_cmd_vel))]
+
+    def on_odometry(self, name: str, message: Odometry) -> None:
+        """Move a body on from a pose; a message that is wrong is refused and counted."""
+        pose, source = message.pose.pose, f'{body_topic(name)}/odom'
+        q, p = pose.orientation, pose.position
+        try:
+            orientation = unit_vector('pose.orientation', (q.x, q.y, q.z, q.w),
+                                      'a quaternion x, y, z, w, not zero', 4)
+            self._drive(source, name, (p.x, p.y, p.z, *orientation), orientation,
+                        message.twist.twist)
+        except errors.ModelError as error:
+            self._counts.refuse(source, error)
+
+    def on_cmd_vel(self, name: str, message: Twist) -> None:
+        """Move a body on from where it is; a message that is wrong is refused and counted."""
+        source = f'{body_topic(name)}/cmd_vel'
+        try:
+            self._drive(source, name, None, self._orientation(name), message)
+        except errors.ModelError as error:
+            self._counts.refuse(source, error)
+
+    def _drive(self, source: str, name: str, pose: Sequence[float] | None,
+               orientation: Sequence[float], twist: Twist) -> None:
+        """Move a body; ``orientation``: of the axes that the twist is along."""
+        parts = [rotation.rotate(orientation, limited(
+            self._counts, source, f'twist.{key}', getattr(twist, key), MAX_SPEED, 'the limit'))
+            for key in ('linear', 'angular')]
+        self._simulation.drive_body(name, pose, [*parts[0].tolist(), *parts[1].tolist()])
+        self._after()
+
+    def _orientation(self, name: str) -> Sequence[float]:
+        """Orientation (4,) of a body's frame now."""
+        placement, bone = self._placed(name)
+        axes = placement.doll.root.pose.relative(Pose()).orientation
+        return rotation.multiply(self._simulation.state.orientations[bone], axes).tolist()
+
+    def _placed(self, name: str) -> tuple[Placement, int]:
+        """A body and its bone."""
+        scene = self._simulation.scene
+        return next((placement, own.start) for placement, own in zip(
+            scene.dolls, scene.bone_slices, strict=True) if placement.name == name)
+
+
+def body_topic(name: str) -> str:
+    """Where a body's topics are: its name with what no topic may have as _."""
+    return '~/bodies/' + re.sub(r'^(?=\d)', '_', re.sub(r'\W', '_', name, flags=re.ASCII))
