@@ -261,7 +261,7 @@ def test_a_push_on_one_of_two_that_sleep_on_each_other_acts_at_once(wait):
                 assert simulation.time < 60e9
             if len(set(engine.cluster_of_doll.tolist())) > 1:
                 continue  # they do not lie on each other
-            engine._age = wait
+            engine._age[:] = wait
             simulation.push(Push('doll_1/torso', (0.0, 0.0, 30.0 * mass), duration=0.05))
             simulation.advance()
             assert conserved(crowd, simulation.state, 1).momentum[2] > 0.1 * mass

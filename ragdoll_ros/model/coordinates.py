@@ -8,6 +8,7 @@ import numpy as np
 from . import errors, rotation
 from .ragdoll import Limits, Ragdoll
 from .scene import Placement
+from .scene_change import SceneChange
 
 UNLIMITED: Limits = (-math.inf, math.inf)
 
@@ -161,3 +162,17 @@ def placed_coordinates(placements: Sequence[Placement]) -> GeneralizedState:
         for key in ('angles', 'rates'))
     state = GeneralizedState(layout.with_joint_angles(q, angles), v)
     return GeneralizedState(state.q, layout.with_joint_rates(state, rates))
+
+
+def changed_coordinates(coordinates: GeneralizedState, change: SceneChange) -> GeneralizedState:
+    """Coordinates and velocities of the dolls after a change: those of ``coordinates``, which are
+    of the dolls before, and new dolls as they are placed.
+    """
+    before, after = (DofLayout([placement.doll for placement in scene.dolls])
+                     for scene in (change.before, change.after))
+    placed = placed_coordinates(change.after.dolls)
+    for doll, old in enumerate(change.old_dolls):
+        if old >= 0:
+            placed.q[after.doll_q[doll]] = coordinates.q[before.doll_q[old]]
+            placed.v[after.doll_v[doll]] = coordinates.v[before.doll_v[old]]
+    return placed

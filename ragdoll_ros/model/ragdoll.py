@@ -11,6 +11,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -293,12 +294,16 @@ class Ragdoll:
         for error in found:
             raise error
 
-    @property
+    @cached_property
+    def largest_half_extents(self) -> np.ndarray:
+        """(n,) m: the largest half extent of each bone."""
+        return np.array([max(bone.shape.half_extents) for bone in self.bones])
+
+    @cached_property
     def extent(self) -> float:
         """Upper bound, m, of the longest edge of its bounding box in the bind pose."""
         positions = np.array([bone.position for bone in self.bones])
-        largest = max(max(bone.shape.half_extents) for bone in self.bones)
-        return float(np.ptp(positions, axis=0).max() + 2 * largest)
+        return float(np.ptp(positions, axis=0).max() + 2 * self.largest_half_extents.max())
 
     @property
     def root(self) -> Bone:

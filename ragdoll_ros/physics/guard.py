@@ -35,13 +35,12 @@ class Guard:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._energy_scales = _energy_scales(simulation.scene)
         self._accept()
 
     def advance(self) -> BadState | None:
         """Advance by one tick; if its state has diverged, go back and return that state."""
         simulation = self._simulation
-        if simulation.reset_count != self._reset_count:
+        if simulation.reset_count != self._reset_count or simulation.scene is not self._scene:
             self._accept()
         before = simulation.state
         try:
@@ -60,7 +59,8 @@ class Guard:
     def _accept(self) -> None:
         """Take the current state as good."""
         simulation = self._simulation
-        self._reset_count = simulation.reset_count
+        self._reset_count, self._scene = simulation.reset_count, simulation.scene
+        self._energy_scales = _energy_scales(simulation.scene)
         self._good = simulation.checkpoint()
         self._excesses = simulation.energy_excesses
 

@@ -1,9 +1,9 @@
 """LoggedSimulation reports each action as an event; apply_event repeats one.
 
 An event is the name of a Simulation method or property and its arguments as numbers, texts and
-lists. The caller of advance() counts the ticks between events. The same scene and the same events
-at the same ticks give the same states to the bit. Event names are part of the log format: they do
-not change with the names in the code.
+lists; that of ``add`` is a Placement. The caller of advance() counts the ticks between events. The
+same scene and the same events at the same ticks give the same states to the bit. Event names are
+part of the log format: they do not change with the names in the code.
 """
 import dataclasses
 import hashlib
@@ -15,6 +15,7 @@ from ..model import errors
 from ..model.coordinates import GeneralizedState
 from ..model.drive import Drive
 from ..model.push import Push
+from ..model.scene import Placement
 from ..model.state import State
 from .accuracy import Accuracy
 from .actions.grab import DRAG_TIME
@@ -111,6 +112,16 @@ class LoggedSimulation(Simulation):
             key: list(map(float, values)) for key, values in given.items() if values is not None}})
         return state
 
+    def add(self, placement: Placement) -> State:
+        state = super().add(placement)
+        self.on_event('add', {'placement': placement})
+        return state
+
+    def remove(self, doll: str) -> State:
+        state = super().remove(doll)
+        self.on_event('remove', {'doll': doll})
+        return state
+
     def reset(self, keep_time: bool = False) -> State:
         state = super().reset(keep_time)
         self.on_event('reset', {**self.conditions, **({'keep_time': True} if keep_time else {})})
@@ -153,8 +164,8 @@ _ACTIONS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
-       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state')},
-    'drive_body': lambda simulation, **arguments: simulation.drive_body(**arguments),
+       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state',
+                    'drive_body', 'add', 'remove')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),
     'parts': lambda simulation, parts: setattr(simulation, 'samples_per_tick', parts),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),

@@ -1,6 +1,7 @@
 """Simulation: integrates a scene tick by tick under pushes, drives, grabs and joint springs."""
 from __future__ import annotations
 
+import dataclasses
 import os
 import warnings
 from collections.abc import Sequence
@@ -10,10 +11,11 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from ..model import errors
-from ..model.coordinates import GeneralizedState, placed_coordinates
+from ..model.coordinates import GeneralizedState, changed_coordinates, placed_coordinates
 from ..model.drive import Drive
 from ..model.push import Push
-from ..model.scene import SECOND, STEP_RANGE, Scene
+from ..model.scene import SECOND, STEP_RANGE, Placement, Scene
+from ..model.scene_change import SceneChange
 from ..model.state import State
 from ..model.vectors import finite_floats, unit_vector
 from .accuracy import Accuracy, resolve_accuracy
@@ -91,15 +93,14 @@ class Simulation:
         choice = resolve_engine(engine)
         self.engine_name, self.engine_reason = choice.name, choice.reason
         """Name of the engine, and why 'auto' did not select rigid."""
-        self._make = partial(choice.make, scene, workers=int(workers))
-        self._engine: Engine = self._make(resolve_accuracy(accuracy))
-        if not self._engine.moves_bodies and any(placement.follow for placement in scene.dolls):
-            raise errors.WrongForm('engine', self.engine_name, 'rigid, for bodies with follow')
+        self._make = partial(choice.make, workers=int(workers))
         self._placed: GeneralizedState | None = None
         self._overlaps: tuple[Overlap, ...] | None = None
         if any(placement.angles or placement.rates for placement in scene.dolls):
             self._placed = placed_coordinates(scene.dolls)
-            self._engine.set_coordinates(self._placed)
+        self._engine = self._make_engine(resolve_accuracy(accuracy))
+        if not self._engine.moves_bodies and any(placement.follow for placement in scene.dolls):
+            raise errors.WrongForm('engine', self.engine_name, 'rigid, for bodies with follow')
         self._start = self._engine.save()
         self._sleep_detector, self._stability_test = SleepDetector(scene), StabilityTest(scene)
         self._swings = _swings(scene)
@@ -470,10 +471,8 @@ class Simulation:
         >>> simulation.set_state('doll', velocity=(0, 0, 2)).linear_velocities[0].round(6).tolist()
         [0.0, 0.0, 2.0]
         """
-        names = [placement.name for placement in self.scene.dolls]
-        if doll not in names:
-            raise errors.UnknownDoll('doll', doll, errors.one_of(names, doll))
-        index, layout, here = names.index(doll), self._engine.layout, self._engine.coordinates
+        index, layout = self._doll_index(doll), self._engine.layout
+        here = self._engine.coordinates
         for values, own, name, given, checked in (
                 (here.q, layout.root_positions, 'position', position, checked_point),
                 (here.v, layout.root_velocities, 'velocity', velocity, finite_floats),
@@ -491,6 +490,40 @@ class Simulation:
             self._swings.reset(self.time, self.state)
         return self.state
 
+    def add(self, placement: Placement) -> State:
+        """Add a doll as it is placed; it is the last one of ``scene``, which is another object.
+
+        Simulated time continues. Other dolls keep their states to the bit, and their pushes, grabs,
+        joint springs and swings. The doll's energy is added to that at the start: energy_excess and
+        work stay. reset() restores the start of the new scene. Bones and angles are named doll/bone
+        from the second doll on. Only the rigid engine adds and removes dolls.
+
+        Raises:
+            DuplicateName: a doll or body of the scene has its name.
+            WrongForm: the engine is not rigid.
+
+        >>> simulation.add(Placement(load_doll('man'), 'man', (0, 2, 1))).positions.shape
+        (27, 3)
+        """
+        dolls = self.scene.dolls
+        # Equal dolls share what is computed for them.
+        doll = next((one.doll for one in dolls if one.doll == placement.doll), placement.doll)
+        return self._change_scene((*dolls, dataclasses.replace(placement, doll=doll)))
+
+    def remove(self, doll: str) -> State:
+        """Remove a doll and all that acts on it. What it touched wakes; all others keep their
+        states to the bit. Its energy is taken from that at the start: energy_excess and work stay.
+
+        Raises:
+            UnknownDoll: the scene has no such doll.
+            WrongForm: it is the only doll, or the engine is not rigid.
+
+        >>> simulation.remove('man').positions.shape
+        (10, 3)
+        """
+        index = self._doll_index(doll)
+        return self._change_scene(self.scene.dolls[:index] + self.scene.dolls[index + 1:])
+
     def checkpoint(self) -> tuple[int, object]:
         """Save time and state for go_back(); cheap enough for every tick."""
         return self.time, self._engine.checkpoint()
@@ -502,10 +535,9 @@ class Simulation:
         PyBullet's broad phase.
         """
         self.time, engine_checkpoint = checkpoint
+        accuracy = self.accuracy
         self._engine.close()
-        self._engine = self._make(self.accuracy)
-        if self._placed is not None:
-            self._engine.set_coordinates(self._placed)
+        self._engine = self._make_engine(accuracy)
         self._start = self._engine.save()
         self._engine.restore_checkpoint(engine_checkpoint)
         self._driven.forget_twists()
@@ -568,6 +600,58 @@ class Simulation:
         self._engine.close()
         self._engine = cast(Engine, _ClosedEngine())
 
+    def _doll_index(self, doll: str) -> int:
+        names = [placement.name for placement in self.scene.dolls]
+        if doll not in names:
+            raise errors.UnknownDoll('doll', doll, errors.one_of(names, doll))
+        return names.index(doll)
+
+    def _make_engine(self, accuracy: Accuracy) -> Engine:
+        """A new engine at the start of the scene."""
+        engine: Engine = self._make(self.scene, accuracy)
+        if self._placed is not None:
+            engine.set_coordinates(self._placed)
+        return engine
+
+    def _change_scene(self, dolls: Sequence[Placement]) -> State:
+        """Go on with these dolls: those that stay in the states that they have."""
+        old = self._engine
+        if not old.supports_scene_changes:
+            raise errors.WrongForm('engine', self.engine_name,
+                                   'rigid, which adds and removes dolls while it runs')
+        change = SceneChange(self.scene, dataclasses.replace(self.scene, dolls=tuple(dolls)))
+        clusters, gone = old.cluster_of_doll, change.new_dolls < 0
+        self._sleep_detector.restart(np.isin(clusters, clusters[gone]))
+        if self._placed is not None or any(
+                placement.angles or placement.rates for placement in dolls):
+            self._placed = changed_coordinates(
+                self._placed or placed_coordinates(self.scene.dolls), change)
+        self.scene, self._overlaps = change.after, None
+        self._engine = self._make_engine(old.accuracy)
+        self._start = self._engine.save()
+        self._engine.continue_from(old, change)
+        old.close()
+        self._carry_over(change)
+        return self.state
+
+    def _carry_over(self, change: SceneChange) -> None:
+        """Let all that is beside the engine go on in the scene after a change."""
+        self.asleep, self.substates = bool(self._engine.sleeping.all()), (self.state,)
+        self._pushes.change_scene(change)
+        self._driven.change_scene(change, self.state)
+        self._hands.change_scene(change)
+        self._joint_springs = self._joint_springs.changed(change)
+        detector, self._sleep_detector = self._sleep_detector, SleepDetector(self.scene)
+        self._sleep_detector.continue_from(detector, change)
+        self._stability_test = StabilityTest(self.scene)
+        for name in ('_gap', '_heights', '_yields'):
+            self.__dict__.pop(name, None)
+        before, self._swings = self._swings, _swings(self.scene)
+        if self._swings and before:
+            self._swings = before.changed(self._swings, change, self.time, self.state)
+        elif self._swings:
+            self._swings.reset(self.time, self.state)
+
     def _advance_until(self, end: int) -> None:
         """Integrate until ``end``, ns; no push begins or ends before."""
         loads: tuple[Wrenches, Springs, Drives] = (), self._springs, ()
@@ -617,7 +701,8 @@ class Simulation:
         if verdict.departing.any():
             engine.set_velocities(verdict.departing, verdict.velocities)
         unstable = untested & ~verdict.stable
-        detector.watch(unstable, self._stability_test.duration, engine.doll_totals.kinetic)
+        detector.watch(unstable, self._stability_test.durations(clusters),
+                       engine.doll_totals.kinetic)
         return unstable
 
     @cached_property

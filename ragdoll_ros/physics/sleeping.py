@@ -8,6 +8,7 @@ import numpy as np
 
 from ..model import rotation
 from ..model.scene import SECOND, Scene
+from ..model.scene_change import SceneChange
 from ..model.state import State
 from .engine.protocol import Engine
 from .stability import ACCELERATION, SOLVED
@@ -37,18 +38,20 @@ class SleepDetector:
     """Tracks for how long each of d dolls has been still."""
 
     def __init__(self, scene: Scene) -> None:
-        self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
+        self._sizes = np.concatenate([placement.doll.largest_half_extents
+                                      for placement in scene.dolls])
         self._lever = np.ones((len(scene.bones), 6))
         self._lever[:, 3:] = self._sizes[:, None]
         """(n, 6): factors from linear and angular velocities to speeds, m/s."""
         self._first = np.array([own.start for own in scene.bone_slices])
         self._doll = scene.doll_of_bone
-        size = min(placement.doll.extent for placement in scene.dolls) / REFERENCE_EXTENT
+        sizes = np.array([placement.doll.extent for placement in scene.dolls]) / REFERENCE_EXTENT
         gravity = math.hypot(*scene.gravity)
         self._has_gravity = gravity > 0
         slower = max(1.0, math.sqrt(REFERENCE_GRAVITY / gravity)) if gravity else math.inf
-        self._speed = math.sqrt(size) / slower * REST_SPEED
-        self._displacement = size * REST_DISPLACEMENT
+        self._speed = np.sqrt(sizes) / slower * REST_SPEED
+        self._displacement = sizes * REST_DISPLACEMENT
+        """(d,) m/s and m: each doll rests by its own size, whatever else is in the scene."""
         self._time = slower * REST_TIME
         self._masses = np.array([placement.doll.mass for placement in scene.dolls])
         # A still bone has at most m v^2 / 2 of linear and less than 3 times that of rotational
@@ -73,12 +76,23 @@ class SleepDetector:
         self._still[dolls], self._wait[dolls] = 0, self._time
         self.watched[dolls], self._bound[dolls] = False, math.inf
 
-    def watch(self, dolls: np.ndarray, duration: float, kinetic: np.ndarray) -> None:
+    def continue_from(self, other: SleepDetector, change: SceneChange) -> None:
+        """Take the timers of the dolls that stay from the detector of the scene before."""
+        stay = change.old_dolls >= 0
+        old = change.old_dolls[stay]
+        for mine, theirs in ((self._still, other._still), (self._wait, other._wait),
+                             (self.watched, other.watched), (self._bound, other._bound)):
+            mine[stay] = theirs[old]
+        bones = change.new_bones >= 0
+        self._since[change.new_bones[bones]] = other._since[bones]
+
+    def watch(self, dolls: np.ndarray, durations: np.ndarray,
+              kinetic: np.ndarray) -> None:
         """Restart the timers of dolls (d,) that seem not to rest. If they are still for
-        ``duration`` s and then not faster than now, by ``kinetic`` (d,) J, they do.
+        ``durations`` (d,) s and then not faster than now, by ``kinetic`` (d,) J, they do.
         """
         self._still[dolls], self.watched[dolls] = 0, True
-        self._wait[dolls] = max(self._time, duration * SECOND)
+        self._wait[dolls] = np.maximum(self._time, durations[dolls] * SECOND)
         self._bound[dolls] = self._grown(kinetic)[dolls]
 
     def all_move(self, engine: Engine) -> bool:

@@ -62,11 +62,11 @@ class StabilityTest:
     """Tests clusters of a scene's dolls by copies in simulation, at rest and disturbed."""
 
     def __init__(self, scene: Scene) -> None:
-        extent = max((placement.doll.extent for placement in scene.dolls
-                      if not placement.is_kinematic), default=0.0)
+        extents = np.array([0.0 if placement.is_kinematic else placement.doll.extent
+                            for placement in scene.dolls])
         gravity = math.hypot(*scene.gravity)
-        self.duration = DURATION * math.sqrt(2 * extent / (3 * gravity)) if gravity else math.inf
-        """s of simulated time in which what is not stable departs."""
+        self._durations = DURATION * np.sqrt(2 * extents / (3 * gravity)) if gravity else (
+            np.full(len(extents), math.inf))
         self._masses = np.array([placement.doll.mass for placement in scene.dolls])
         layout = DofLayout([placement.doll for placement in scene.dolls])
         self._disturbance = np.zeros(layout.sizes[1])
@@ -75,21 +75,42 @@ class StabilityTest:
             self._disturbance[own] = disturbance(scene.dolls[doll], own.stop - own.start)
             self._doll_of_v[own] = doll
 
+    def durations(self, clusters: np.ndarray) -> np.ndarray:
+        """Simulated time (d,) s in which what is not stable departs: by the largest doll of each
+        one's cluster, ``clusters`` (d,).
+        """
+        longest = np.zeros(len(clusters))
+        np.maximum.at(longest, clusters, self._durations)
+        return longest[clusters]
+
     def judge(self, engine: Engine, dolls: np.ndarray, still: np.ndarray) -> RestVerdict:
         """Test ``dolls`` (d,), whole clusters, which stay as they are. A copy whose cluster exceeds
         its kinetic energy ``still`` (d,) J is in motion, and ends. There must be gravity.
         """
+        durations = self.durations(engine.cluster_of_doll)
+        verdict = RestVerdict(np.zeros_like(dolls), np.zeros_like(dolls),
+                              np.zeros_like(self._disturbance))
+        for duration in np.unique(durations[dolls]):
+            one = self._judge(engine, dolls & (durations == duration), still, duration)
+            verdict = RestVerdict(verdict.stable | one.stable, verdict.departing | one.departing,
+                                  verdict.velocities + one.velocities)
+        return verdict
+
+    def _judge(self, engine: Engine, dolls: np.ndarray, still: np.ndarray,
+               duration: float) -> RestVerdict:
+        """The verdict on ``dolls`` (d,) whose tests take ``duration`` s."""
         clusters = engine.cluster_of_doll
         velocities, departing = np.zeros_like(self._disturbance), np.zeros_like(dolls)
         limit = np.sqrt(2 * np.bincount(clusters, still))
         never = np.full((SAMPLES + 1, len(limit)), math.inf)
-        at_rest, _ = self._simulate(engine, dolls, velocities, never, limit)
+        interval = duration / SAMPLES
+        at_rest, _ = self._simulate(engine, dolls, (velocities, interval), never, limit)
         for sign in (1.0, -1.0):
             left = dolls & ~departing
             if not left.any():
                 break
             disturbed = sign * self._disturbance
-            _, grown = self._simulate(engine, left, disturbed, at_rest, limit)
+            _, grown = self._simulate(engine, left, (disturbed, interval), at_rest, limit)
             found = left & grown[clusters]
             velocities[found[self._doll_of_v]] = disturbed[found[self._doll_of_v]]
             departing |= found
@@ -97,14 +118,14 @@ class StabilityTest:
             at_rest, np.bincount(clusters, self._masses))
         return RestVerdict(dolls & ~departing & ~moving[clusters], departing, velocities)
 
-    def _simulate(self, engine: Engine, dolls: np.ndarray, velocities: np.ndarray,
+    def _simulate(self, engine: Engine, dolls: np.ndarray, start: tuple[np.ndarray, float],
                   at_rest: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """|v| (SAMPLES + 1, c) of the clusters of copies that start with ``velocities``, and which
-        (c,) exceed GROWTH (``at_rest`` + |d|), |d| that of the start, and still grow. Ends as soon
-        as each does, exceeds ``limit`` (c,), or is at rest. The first interval, in which gaps of
-        some um close, does not count.
+        """|v| (SAMPLES + 1, c) of the clusters of copies that ``start`` with velocities, at
+        intervals, s; and which (c,) exceed GROWTH (``at_rest`` + |d|), |d| that of the start, and
+        still grow. Ends as soon as each does, exceeds ``limit`` (c,), or is at rest. The first
+        interval, in which gaps of some um close, does not count.
         """
-        interval = self.duration / SAMPLES
+        velocities, interval = start
         clusters = engine.cluster_of_doll
         slow = QUIET * DISTURBANCE * np.sqrt(np.bincount(clusters, self._masses))
         ended = np.bincount(clusters, dolls) == 0

@@ -15,6 +15,7 @@ from ...model import errors, rotation
 from ...model.drive import MAX_SPEED
 from ...model.pose import Pose
 from ...model.scene import SECOND, Scene
+from ...model.scene_change import SceneChange
 from ...model.state import State
 from ...model.vectors import clamp_norm, finite_floats, unit_vector
 from ..engine.protocol import AppliedDrive
@@ -168,14 +169,25 @@ class DrivenBodies:
     """All bodies of a scene with `follow`. Times in ns."""
 
     def __init__(self, scene: Scene, state: State) -> None:
-        self._bodies = {placement.name: _Body(scene, doll, state)
-                        for doll, placement in enumerate(scene.dolls) if placement.follow}
-        self._exact = [body for body in self._bodies.values() if body.placement.is_kinematic]
-        self._limited = [body for body in self._bodies.values()
-                         if not body.placement.is_kinematic]
+        self._set_bodies({placement.name: _Body(scene, doll, state)
+                          for doll, placement in enumerate(scene.dolls) if placement.follow})
+
+    def _set_bodies(self, bodies: dict[str, _Body]) -> None:
+        self._bodies = bodies
+        self._exact = [body for body in bodies.values() if body.placement.is_kinematic]
+        self._limited = [body for body in bodies.values() if not body.placement.is_kinematic]
 
     def __len__(self) -> int:
         return len(self._bodies)
+
+    def change_scene(self, change: SceneChange, state: State) -> None:
+        """Let the bodies that stay go on as they move, and those that come stand."""
+        bodies = DrivenBodies(change.after, state)._bodies
+        for name, body in self._bodies.items():
+            if name in bodies:
+                body.doll, body.bone = bodies[name].doll, bodies[name].bone
+                bodies[name] = body
+        self._set_bodies(bodies)
 
     @property
     def jumps(self) -> int:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...model import errors
 from ...model.scene import Scene
+from ...model.scene_change import SceneChange
 from ...model.state import State
 from ...model.vectors import Vector, floats
 from ..engine.protocol import Spring
@@ -97,6 +98,13 @@ class Hands:
     def let_go(self, name: str) -> None:
         """Detach a hand."""
         self._springs.pop(name, None)
+
+    def change_scene(self, change: SceneChange) -> None:
+        """Let go of dolls that are gone."""
+        self._scene = change.after
+        bones = {name: int(change.new_bones[spring.bone]) for name, spring in self._springs.items()}
+        self._springs = {name: dataclasses.replace(spring, bone=bones[name])
+                         for name, spring in self._springs.items() if bones[name] >= 0}
 
     def move(self, duration: float) -> None:
         """Advance the hands' positions by ``duration`` s."""

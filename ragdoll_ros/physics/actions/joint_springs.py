@@ -1,4 +1,7 @@
 """Joint springs: springs on joint angles, as of muscles that hold a pose until they go limp."""
+from __future__ import annotations
+
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -6,6 +9,7 @@ import numpy as np
 
 from ...model import errors
 from ...model.scene import Scene
+from ...model.scene_change import SceneChange
 from ..engine.protocol import AppliedJointSpring
 
 MAX_STIFFNESS = 1e6
@@ -57,6 +61,14 @@ class JointSprings:
         errors.check_finite('target', (aim,))
         bone, axis = self._axes[index]
         self._applied[angle] = AppliedJointSpring(bone, axis, aim, float(stiffness), float(damping))
+
+    def changed(self, change: SceneChange) -> JointSprings:
+        """Those on dolls that stay, in the scene after."""
+        after, names = JointSprings(change.after), change.angle_names
+        after._applied = {
+            names[angle]: dataclasses.replace(spring, bone=int(change.new_bones[spring.bone]))
+            for angle, spring in self._applied.items() if angle in names}
+        return after
 
     def go_limp(self, angles: Sequence[str] | None) -> None:
         """Remove the springs of these angles; None: of all."""

@@ -1,4 +1,5 @@
 """PushQueue: a bounded queue of pushes and drives, and the loads of those that are active."""
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ from ...model import errors, rotation
 from ...model.drive import Drive
 from ...model.push import Push
 from ...model.scene import SECOND, Scene
+from ...model.scene_change import SceneChange
 from ...model.state import State
 from ..engine.protocol import AppliedDrive, AppliedWrench
 
@@ -62,6 +64,17 @@ class PushQueue:
     def drop_ended(self, now: int) -> None:
         """Remove pushes that have ended."""
         self._queue = [queued for queued in self._queue if queued.end > now]
+
+    def change_scene(self, change: SceneChange) -> None:
+        """Keep the pushes on dolls that stay."""
+        self._scene, queue, self._queue = change.after, self._queue, []
+        for queued in queue:
+            bone = int(change.new_bones[queued.bone])
+            if bone >= 0:
+                self._queue.append(dataclasses.replace(
+                    queued, bone=bone,
+                    push=dataclasses.replace(queued.push, bone=change.after.bone_names[bone]),
+                    wrench=queued.wrench and dataclasses.replace(queued.wrench, bone=bone)))
 
     def active(self, now: int) -> tuple[Push, ...]:
         """Active pushes; a drive as the push that it exerts on a bone at rest."""

@@ -11,6 +11,7 @@ import numpy as np
 from ...model import errors
 from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
+from ...model.scene_change import SceneChange
 from ...model.state import State
 from ..accuracy import Accuracy
 from .doll_totals import DollTotals
@@ -183,6 +184,8 @@ class Engine(Protocol):
     """Whether advance() takes AppliedJointSpring."""
     moves_bodies: bool
     """Whether there are bodies with ``follow``, and set_twist()."""
+    supports_scene_changes: bool
+    """Whether there is continue_from()."""
     simulates_copies: bool
     """Whether there are set_velocities() and simulate_copy(), for StabilityTest."""
     sleeping: np.ndarray
@@ -232,6 +235,12 @@ class Engine(Protocol):
     def set_twist(self, doll: int, velocity: np.ndarray, spin: np.ndarray) -> None:
         """Set the velocity (3,) m/s of the centre of mass and the angular velocity (3,) rad/s,
         world frame, at which a doll that follows exactly moves from now on; wake its cluster.
+        """
+
+    def continue_from(self, engine: Engine, change: SceneChange) -> None:
+        """Take the states of the dolls that stay, to the bit, from the ``engine`` of the scene
+        before; its clusters that lose a doll wake. A doll that comes adds its energy to the
+        account, one that goes takes its energy; excess and work stay.
         """
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),

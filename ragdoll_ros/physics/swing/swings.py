@@ -10,14 +10,17 @@ chain (chains.py). Their other motion has no effect on it. This is exact for sin
 Energy of an undamped chain is not conserved: hair needs a damping of 0.3 or more, and few links.
 With less, a strand that is shaken hard moves chaotically.
 """
+from __future__ import annotations
+
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from ...model import rotation
-from ...model.scene import SECOND, Scene
+from ...model.scene import SECOND, Placement, Scene
+from ...model.scene_change import SceneChange
 from ...model.state import State
 from ..kernels.compiling.decorators import rows_of
 from ..kernels.swing.links import LINK_STATE, RESPONSE, Chains
@@ -106,6 +109,22 @@ class Swings:
         self._free.begin(time, bones)
         self._last = self._state(self._states, time)
 
+    def resume(self, time: float, other: Swings, masses: np.ndarray) -> None:
+        """Start at ``time`` s, at rest but for masses of ``other``, which go on as they are there:
+        ``masses`` (m,) is the index here of each, -1 for none.
+        """
+        self.begin(time)
+        stay = masses >= 0
+        directions, rates = self._last.directions, self._last.rates
+        directions[masses[stay]] = other._last.directions[stay]
+        rates[masses[stay]] = other._last.rates[stay]
+        self.begin(time, directions, rates)
+        here, there = self._mass_index.free, other._mass_index.free
+        known = masses[there] >= 0
+        self._free.resume(np.searchsorted(here, masses[there][known]),
+                          (rows[known] for rows in vars(other._last.free).values()))
+        self._last = self._state(self._states, time)
+
     def _instant(self, index: int) -> float:
         return self._begin + index * self.step
 
@@ -159,14 +178,20 @@ class _FreeFall:
         arm = rotation.rotate(self._turn, self._root)
         rod = rotation.rotate(self._turn, self._rod)
         self._from = bones.positions[self._bone] + arm + rod
+        self._thrown = self._velocity.copy()
+
+    def resume(self, masses: np.ndarray, motion: Iterable[np.ndarray]) -> None:
+        """Let ``masses`` (k,) go on from the begin with positions, velocities and orientations."""
+        for mine, given in zip((self._from, self._thrown, self._turn), motion, strict=True):
+            mine[masses] = given
 
     def at(self, time: float) -> FreeMasses:
         """State of the masses at ``time`` s."""
         if not len(self._bone):
             return _NO_MASSES
         t = time - self._begin
-        return FreeMasses(self._from + self._velocity * t + self._gravity * (t * t / 2),
-                      self._velocity + self._gravity * t, self._turn)
+        return FreeMasses(self._from + self._thrown * t + self._gravity * (t * t / 2),
+                      self._thrown + self._gravity * t, self._turn)
 
 
 def _rods(mount: SwingMount) -> np.ndarray:
@@ -196,6 +221,20 @@ class SwingSimulation:
         self._swings.begin(time / SECOND)
         self.state = self._swings.evaluate(time / SECOND)
 
+    def changed(self, after: SwingSimulation, change: SceneChange, time: int,
+                state: State) -> SwingSimulation:
+        """The swings of the scene after a change at ``time`` ns, of which ``after`` is new. Those
+        that stay go on; if all do and none comes, to the bit.
+        """
+        masses = _new_masses(change)
+        if np.array_equal(masses, np.arange(len(after.names))):
+            self._bones, self.names = change.new_bones[self._bones], after.names
+            return self
+        after.reset(time, state)
+        after._swings.resume(time / SECOND, self._swings, masses)
+        after.state = after._swings.evaluate(time / SECOND)
+        return after
+
     def advance(self, time: int, state: State) -> None:
         """Advance to ``time`` ns, where the bones are in ``state``."""
         self._add(time, state)
@@ -203,3 +242,20 @@ class SwingSimulation:
 
     def _add(self, time: int, state: State) -> None:
         self._track.add(time / SECOND, State.of(state.rows[self._bones]))
+
+
+def _new_masses(change: SceneChange) -> np.ndarray:
+    """Index (m,) in the scene after of each mass of the scene before; -1: it is gone."""
+    first, at = [], 0
+    for placement in change.after.dolls:
+        first.append(at)
+        at += _mass_count(placement)
+    return np.concatenate([
+        first[doll] + np.arange(_mass_count(placement)) if doll >= 0
+        else np.full(_mass_count(placement), -1)
+        for placement, doll in zip(change.before.dolls, change.new_dolls, strict=True)])
+
+
+def _mass_count(placement: Placement) -> int:
+    """Masses of all swings of a doll."""
+    return sum(len(swing.links) for swing in placement.doll.swings)

@@ -1,4 +1,6 @@
 """Clusters: dolls that may touch soon are integrated as one system, every other doll alone."""
+from __future__ import annotations
+
 import dataclasses
 import itertools
 from concurrent.futures import ThreadPoolExecutor
@@ -8,6 +10,7 @@ import numpy as np
 
 from ....model.coordinates import DofLayout
 from ....model.scene import Scene
+from ....model.scene_change import SceneChange
 from ...accuracy import Accuracy
 from ...kernels.cluster_state import LEDGER, STEP_STATS, ClusterState, make_cluster_state
 from ...kernels.compiling.bundle import bind
@@ -56,7 +59,7 @@ class Cluster:
     workspaces: list[Workspace]
     bundles: list[list[np.ndarray]]
     """Rows that bind system, state, and a workspace for each thread; see compiling/bundle.py."""
-    islands: list['Cluster'] = field(default_factory=list)
+    islands: list[Cluster] = field(default_factory=list)
     """Those that were advanced in its place in the last window of a tick; see islands.py."""
 
     def job(self, worker: int) -> tuple[int, int, int]:
@@ -94,6 +97,8 @@ class Clusters:
         """(d, 20): the sums as DollTotals has them."""
         self.sums, self.stats = whole['doll_sums'], whole['stats']
         """The statistics of a cluster of several dolls are stored at its first doll."""
+        self.departed = np.zeros(1, STEP_STATS)
+        """Summed statistics of dolls that are gone."""
         first = STEP_STATS.fields['work_pushes'][1] // STEP_STATS.fields['work_grabs'][0].itemsize
         self._work = self.stats.view(float).reshape(len(self.stats), -1)[:, first:first + 2]
         """(d, 2) J, of pushes and of grabs."""
@@ -121,14 +126,10 @@ class Clusters:
                           system.geoms['reach'])
         return reach
 
-    @property
-    def all_alone(self) -> bool:
-        """Whether each doll is a cluster by itself."""
-        return not len(self.pairs)
-
-    def covers(self, pairs: np.ndarray) -> bool:
-        """Whether all these pairs (k, 2) of dolls are pairs of the clusters."""
-        return self._keys_of_pairs.issuperset(self._pair_keys(pairs).tolist())
+    def knows(self, pairs: np.ndarray) -> np.ndarray:
+        """Which of these pairs (k, 2) of dolls are pairs of the clusters."""
+        return np.array([key in self._keys_of_pairs for key in self._pair_keys(pairs).tolist()],
+                        bool)
 
     def form(self, pairs: np.ndarray) -> None:
         """Form clusters of dolls that ``pairs`` (k, 2) connect; every other doll stays alone."""
@@ -247,13 +248,14 @@ class Clusters:
 
     def totals(self) -> dict[str, float]:
         """Statistics since the start, summed over clusters."""
-        return {name: self.stats[name].sum() for name in SUMMED_STATS}
+        return {name: self.stats[name].sum() + self.departed[name][0] for name in SUMMED_STATS}
 
     def ledger(self) -> dict[str, int]:
         """What all steps since the start are made of; see LEDGER."""
         counted = ('steps', 'impacts', 'flight_steps', 'sweeps')
-        return {**{name: int(self.stats[name].sum()) for name in counted},
-                **{name: int(self.stats['ledger'][name].sum()) for name in LEDGER.names}}
+        both = np.concatenate([self.stats, self.departed])
+        return {**{name: int(both[name].sum()) for name in counted},
+                **{name: int(both['ledger'][name].sum()) for name in LEDGER.names}}
 
     def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Contacts (c,) of each cluster's last step; clusters in flight have none. With what
@@ -310,18 +312,42 @@ class Clusters:
 
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
-        return (self._states.save(), self.members, self.static_geoms.save(),
+        return (self._states.save(), self.departed.copy(), self.members, self.static_geoms.save(),
                 [_saved(cluster) for cluster in self._joined])
 
     def restore(self, snapshot: tuple) -> None:
         """Restore a snapshot."""
-        states, members, near, several = snapshot
+        states, self.departed[:], members, near, several = snapshot
         self._states.restore(states)
         self.static_geoms.restore(near)
         if members is not self.members:
             self._set_clusters(members)
         for saved in several:
             _restore(*saved)
+
+    def continue_from(self, other: Clusters, change: SceneChange) -> None:
+        """Take the states of the dolls that stay, and the clusters of which all do, from those of
+        the scene before. Dolls of other clusters become clusters by themselves.
+        """
+        for doll, old in enumerate(change.old_dolls):
+            if old >= 0:
+                self._states.copy(doll, other._states, old)
+        self._depart(other, change.new_dolls < 0)
+        whole = np.ones(len(change.new_dolls), bool)
+        members = {}
+        for cluster in other.members:
+            dolls = change.new_dolls[cluster.dolls]
+            if (dolls >= 0).all():
+                members[dolls[0]] = self._moved(cluster, other, change)
+            else:
+                whole[cluster.dolls] = False
+        of_member = {doll for cluster in members.values() for doll in cluster.dolls.tolist()}
+        for doll, single in enumerate(self._singles):
+            if doll not in of_member:
+                members[doll] = single
+                _invalidate(single)
+        self.static_geoms.continue_from(other.static_geoms, change, whole)
+        self._set_clusters([members[first] for first in sorted(members)])
 
     def save_states(self, dolls: np.ndarray) -> list[tuple]:
         """Copy the states of ``dolls`` (d,), whole clusters."""
@@ -336,13 +362,41 @@ class Clusters:
 
     def checkpoint(self) -> dict[str, np.ndarray]:
         """The fields CHECKPOINT of all states; as bytes, as numpy copies records slowly."""
-        return {name: self._states.arrays[name].view(np.uint8).copy() for name in CHECKPOINT}
+        return {'departed': self.departed.copy(), **{
+            name: self._states.arrays[name].view(np.uint8).copy() for name in CHECKPOINT}}
 
     def restore_checkpoint(self, checkpoint: dict[str, np.ndarray]) -> None:
         """Restore a checkpoint, each doll a cluster by itself."""
-        for name, values in checkpoint.items():
-            self._states.arrays[name].view(np.uint8)[:] = values
+        self.departed[:] = checkpoint['departed']
+        for name in CHECKPOINT:
+            self._states.arrays[name].view(np.uint8)[:] = checkpoint[name]
         self.separate()
+
+    def _depart(self, other: Clusters, gone: np.ndarray) -> None:
+        """Add the statistics of the dolls of ``other`` that are ``gone`` (d,) to the departed."""
+        self.departed[:] = other.departed
+        for name in SUMMED_STATS:
+            self.departed[name] += other.stats[name][gone].sum()
+        for name in LEDGER.names:
+            self.departed['ledger'][name] += other.stats['ledger'][name][gone].sum()
+
+    def _moved(self, cluster: Cluster, other: Clusters, change: SceneChange) -> Cluster:
+        """A cluster of ``other`` with the indices of the scene after a change, in which all of its
+        dolls are; its state is shared.
+        """
+        dolls = change.new_dolls[cluster.dolls]
+        if other._is_single(cluster):
+            return self._singles[dolls[0]]
+        bones, q, v = (np.concatenate([parts[doll] for doll in dolls])
+                       for parts in (self._bones, self._q, self._v))
+        stats = self.stats[dolls[0]:dolls[0] + 1]
+        moved = _bind_cluster(
+            dolls, change.new_dolls[cluster.pairs],
+            self.static_geoms.moved_keys(cluster.static_keys, change), bones, q, v, cluster.system,
+            cluster.state._replace(stats=stats),
+            [workspace._replace(stats=stats) for workspace in cluster.workspaces])
+        moved.islands = [self._moved(island, other, change) for island in cluster.islands]
+        return moved
 
     def _pair_keys(self, pairs: np.ndarray) -> np.ndarray:
         """A unique number of each pair (k, 2)."""
@@ -360,6 +414,9 @@ class Clusters:
         self._firsts = np.array([cluster.dolls[0] for cluster in clusters])
         self.pairs = np.concatenate([NO_PAIRS, *(cluster.pairs for cluster in self._joined)])
         """(k, 2) of dolls that may touch, of all clusters."""
+        self.have_pairs = np.zeros(len(self._singles), bool)
+        """(d,) which dolls may touch others."""
+        self.have_pairs[self.pairs] = True
         self._keys_of_pairs = frozenset(self._pair_keys(self.pairs).tolist())
         self._jobs = np.array([[cluster.job(worker) for cluster in clusters]
                                for worker in range(self._workers)], np.int64)

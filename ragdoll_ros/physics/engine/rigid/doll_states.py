@@ -1,4 +1,6 @@
 """DollStates: the cluster states of all single dolls, in arrays of the whole scene."""
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np
@@ -49,6 +51,11 @@ class DollStates(Sequence):
         counts = np.where(dolls, np.minimum(self.arrays['stats']['contact_count'], self._room), 0)
         begin = np.repeat(self._first - np.cumsum(counts) + counts, counts)
         return begin + np.arange(len(begin)), np.repeat(np.arange(len(counts)), counts)
+
+    def copy(self, doll: int, other: DollStates, old: int) -> None:
+        """Copy the state of doll ``old`` of ``other``, an equal one, to ``doll``."""
+        for name in (*SNAPSHOT, 'contacts'):
+            getattr(self._each[doll], name)[:] = getattr(other._each[old], name)
 
     def save(self) -> object:
         """A snapshot of all states."""

@@ -2,6 +2,8 @@
 
 The algorithm of a tick is in kernels/advance.py.
 """
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Generator, Iterable
 
@@ -10,6 +12,7 @@ import numpy as np
 from ....model import rotation
 from ....model.coordinates import DofLayout, GeneralizedState, placed_coordinates
 from ....model.scene import Scene
+from ....model.scene_change import SceneChange
 from ....model.state import State
 from ...accuracy import DRAFT, Accuracy
 from ...rigid_body import GroundHeights
@@ -33,7 +36,7 @@ COPY_STEPS, COPY_START = 2, 0.1
 steps: in a long step contacts take all of a disturbance, also what would make a doll depart."""
 
 MAX_AGE = 10
-"""Intervals for which clusters are kept, unless other dolls come near."""
+"""Intervals for which a cluster is kept, unless another doll comes near."""
 
 
 class RigidEngine:
@@ -42,6 +45,7 @@ class RigidEngine:
     energy_error = 1e-2
     supports_joint_springs = True
     moves_bodies = True
+    supports_scene_changes = True
     simulates_copies = True
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
@@ -57,6 +61,8 @@ class RigidEngine:
         self._twisted: set[int] = set()
         """Dolls whose twist has been set since the last interval."""
         self.sleeping = np.zeros(len(scene.dolls), bool)
+        self._age = np.full(len(scene.dolls), MAX_AGE)
+        """(d,) intervals since the cluster of each doll was formed."""
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]
         """Pairs that overlap at the start: they are excluded until they separate."""
@@ -94,14 +100,14 @@ class RigidEngine:
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:] = coordinates.q
         v[:] = self._in_root_axes(coordinates)
-        clusters.stats[:] = clusters.contact_impulses[:] = 0
+        clusters.stats[:] = clusters.contact_impulses[:] = clusters.departed[:] = 0
         clusters.separate()
         self.sleeping[:] = False
         self._refresh()
         self._lift_out_of_ground(range(len(self.scene.dolls)))
         clusters.exclude([own | JOINT_OUTSIDE_LIMITS for own in self._initial_overlaps])
         self._refresh()
-        self._age = MAX_AGE
+        self._age[:] = MAX_AGE
         self._start_energies = self.doll_totals.energy.copy()
         self._last_start = None
 
@@ -113,7 +119,7 @@ class RigidEngine:
         self._lift_out_of_ground([doll])
         clusters.set_doll(doll, clusters.q, clusters.v)
         self._refresh()
-        self._age = MAX_AGE
+        self._age[self.cluster_of_doll == self.cluster_of_doll[doll]] = MAX_AGE
         self._last_start = None
         clusters.add_work(self.doll_totals.energy - before)
 
@@ -127,6 +133,19 @@ class RigidEngine:
         self._clusters.advance(0.0, self.accuracy, ~own)
         self._update_state()
         self._twisted.add(doll)
+
+    def continue_from(self, engine: RigidEngine, change: SceneChange) -> None:
+        gone, excesses = change.new_dolls < 0, engine.energy_excesses
+        engine._wake(np.isin(engine.cluster_of_doll, engine.cluster_of_doll[gone]))
+        stay = change.old_dolls >= 0
+        old = change.old_dolls[stay]
+        self.sleeping[stay] = engine.sleeping[old]
+        self._start_energies = self._start_energies.copy()  # a snapshot has the other
+        self._start_energies[stay] = engine._start_energies[old]
+        self._start_energies[0] -= excesses[gone].sum()
+        self._clusters.continue_from(engine._clusters, change)
+        self._age[stay], self._last_start = engine._age[old], None
+        self._update_state()
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
@@ -208,8 +227,8 @@ class RigidEngine:
 
     @property
     def work(self) -> tuple[float, float]:
-        stats = self._clusters.stats
-        return float(stats['work_pushes'].sum()), float(stats['work_grabs'].sum())
+        totals = self._clusters.totals()
+        return float(totals['work_pushes']), float(totals['work_grabs'])
 
     def measures(self) -> dict[str, float]:
         stats = self._clusters.totals()
@@ -229,10 +248,11 @@ class RigidEngine:
         return self._clusters.ledger()
 
     def save(self) -> object:
-        return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energies
+        return (self._clusters.save(), self.sleeping.copy(), self._age.copy(),
+                self._start_energies)
 
     def restore(self, snapshot: tuple) -> None:
-        saved, self.sleeping[:], self._age, self._start_energies = snapshot
+        saved, self.sleeping[:], self._age[:], self._start_energies = snapshot
         self._clusters.restore(saved)
         self._last_start = None
         self._update_state()
@@ -246,7 +266,7 @@ class RigidEngine:
     def restore_checkpoint(self, checkpoint: tuple) -> None:
         saved, self.sleeping[:], self._start_energies = checkpoint
         self._clusters.restore_checkpoint(saved)
-        self._age = MAX_AGE
+        self._age[:] = MAX_AGE
         self._last_start = None
         self._refresh()
 
@@ -263,28 +283,32 @@ class RigidEngine:
                                                      ~(self.sleeping | self._kinematic))
         if pairs is not None:
             clusters.form(pairs)
-            self._age = 0
         elif found_others:
             clusters.form(clusters.pairs)
 
     def _pairs_to_form(self, duration: float) -> np.ndarray | None:
         """Pairs (k, 2) of dolls of which clusters are to be formed; None: they hold. Wakes dolls
-        that may be touched.
+        that may be touched. Clusters that hold stay as they are: their last digits do not depend on
+        what others do.
         """
-        clusters = self._clusters
+        clusters, of_doll = self._clusters, self.cluster_of_doll
         near = self._near_pairs(duration)
         self._age += 1
-        if (clusters.covers(near) and not self.sleeping[near].any()
-                and (self._age <= MAX_AGE or clusters.all_alone)):
+        stale = clusters.have_pairs & (self._age > MAX_AGE)
+        stale[near[~clusters.knows(near) | self.sleeping[near].any(axis=1)]] = True
+        if not np.count_nonzero(stale):
             return None
         while True:
+            stale = (np.bincount(of_doll, stale) > 0)[of_doll]
             near = self._near_pairs(max(duration, LOOK_AHEAD))
-            if not self.sleeping[near].any():
+            near = near[stale[near].any(axis=1)]
+            if stale[near].all() and not self.sleeping[near].any():
                 break
+            stale[near] = True
             self._wake(near)
-        asleep = clusters.pairs
-        asleep = asleep[self.sleeping[asleep].all(axis=1)]
-        return np.unique(np.concatenate([near, asleep]), axis=0)
+        self._age[stale] = 0
+        kept = clusters.pairs[(~stale[clusters.pairs] | self.sleeping[clusters.pairs]).all(axis=1)]
+        return np.unique(np.concatenate([near, kept]), axis=0)
 
     def _wake(self, dolls: np.ndarray) -> None:
         """Wake dolls, indices or a mask (d,)."""

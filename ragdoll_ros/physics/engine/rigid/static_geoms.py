@@ -1,10 +1,13 @@
 """StaticGeoms: the geoms of a scene's static bodies, and which of them bones may touch soon."""
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np
 
 from ....model import rotation
 from ....model.scene import Scene
+from ....model.scene_change import SceneChange
 from ....model.shapes import Part, support_distance
 from ...kernels.collision.shapes import SHAPE_KIND
 from ...kernels.dynamics.body import WORLD
@@ -83,6 +86,17 @@ class StaticGeoms:
         """Forget all pairs."""
         self._keys = NO_KEYS
 
+    def continue_from(self, other: StaticGeoms, change: SceneChange, known: np.ndarray) -> None:
+        """Take the pairs of the ``known`` dolls (d,) of the scene before, which stay."""
+        self._keys = self.moved_keys(other._keys[known[other._dolls_of(other._keys)]], change)
+
+    def moved_keys(self, keys: np.ndarray, change: SceneChange) -> np.ndarray:
+        """Pairs (k,) of the scene before, of bones that stay, in the scene after."""
+        if not len(keys):
+            return NO_KEYS
+        bones, geoms = self.bones_and_geoms(keys)
+        return change.new_bones[bones] * len(self.geoms) + geoms
+
     def save(self) -> np.ndarray:
         """A snapshot of the known pairs."""
         return self._keys
@@ -93,7 +107,7 @@ class StaticGeoms:
 
     def _dolls_of(self, keys: np.ndarray) -> np.ndarray:
         """The doll (k,) of each pair."""
-        return self._doll_of_bone[keys // len(self.geoms)]
+        return self._doll_of_bone[keys // max(1, len(self.geoms))]
 
     def _find(self, states: np.ndarray, ahead: float, moving: np.ndarray) -> np.ndarray:
         """Pairs (k,) that may touch within ``ahead`` s, of ``moving`` dolls (d,), sorted."""

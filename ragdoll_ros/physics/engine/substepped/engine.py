@@ -37,6 +37,7 @@ class SubsteppedEngine(ABC):
 
     supports_joint_springs = False
     moves_bodies = False
+    supports_scene_changes = False
     simulates_copies = False
 
     lags = True
