@@ -8,7 +8,7 @@ import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from ragdoll_ros.files.run_scene import run_scene_text, scene_digest
+from ragdoll_ros.files.run_scene import placement_text, run_scene_text, scene_digest
 from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.physics.logged_simulation import LoggedSimulation, state_digest
 
@@ -68,6 +68,8 @@ def messages_of_a_run(scene, ticks, act, hashed=10, engine='auto', node='/ragdol
 
     def tell(kind, fields):
         begin = {'scene': scene_digest(text)} if kind in ('start', 'reset') else {}
+        if kind == 'add':
+            fields = {'placement': placement_text(fields['placement'])}
         events.append({'number': len(events), 'tick': tick, 'kind': kind, **begin, **fields})
 
     with LoggedSimulation(scene, engine=engine) as simulation:

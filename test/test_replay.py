@@ -12,8 +12,10 @@ from digests import disturb
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
+from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.run_scene import run_scene_text, versions
 from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model.scene import Placement
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.save import FORMATS
 from ragdoll_ros.replay.command import main
@@ -66,6 +68,19 @@ def test_a_run_is_repeated_to_the_bit_from_a_folder_or_a_file(tmp_path, replay, 
         assert f'{TICKS} ticks' in said and '21 of 21 hashes equal' in said
     (tmp_path / 'bag/metadata.yaml').unlink()  # as where the recorder was killed
     assert replay(tmp_path / 'bag')[0] == 0
+
+
+def test_dolls_that_come_and_go_do_so_again(tmp_path, replay):
+    def come_and_go(simulation, tick):
+        if tick == 10:
+            simulation.add(Placement(load_doll('doll'), 'second', (0.1, 0.2, 1.3), spin=(0, 1, 0),
+                                     angles={'left_shin': 0.1}))
+        if tick == 50:
+            simulation.remove('doll')
+
+    code, said, warned = replay(write_bag(tmp_path / 'bag', messages_of_a_run(
+        load_scene('drop'), 80, come_and_go)))
+    assert (code, warned) == (0, '') and '2 events repeated, 9 of 9 hashes equal' in said
 
 
 def test_one_number_that_is_another_is_found_at_the_next_hash(tmp_path, replay, messages):

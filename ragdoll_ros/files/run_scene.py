@@ -1,4 +1,6 @@
-"""The scene of a run as YAML, with the versions of the libraries that computed it: ~/scene."""
+"""The scene of a run as YAML, with the versions of the libraries that computed it: ~/scene. A doll
+that comes later in the same form.
+"""
 import hashlib
 import platform
 import re
@@ -6,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ..model.errors import ModelErrors, Unreadable
-from ..model.scene import Scene
+from ..model.scene import Placement, Scene
 from . import yaml_text
 from .scene import scene_from_data, scene_text
 
@@ -38,6 +40,16 @@ def read_run_scene(text: str) -> tuple[Scene, str]:
     if not found:
         raise ModelErrors('~/scene', [Unreadable('', text[:60], 'a line "# versions: ..."')])
     return scene_from_data(yaml_text.parse(text.encode()), Path('/scene')), found[1]
+
+
+def placement_text(placement: Placement) -> str:
+    """YAML of a placed doll, as a scene of it alone; read_placement reads an equal one."""
+    return run_scene_text(Scene(placement.name, (placement,)))
+
+
+def read_placement(text: str) -> Placement:
+    """The placement of a text of placement_text. Raises ModelErrors."""
+    return read_run_scene(text)[0].dolls[0]
 
 
 def scene_digest(text: str) -> str:

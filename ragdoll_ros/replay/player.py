@@ -2,6 +2,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from ..files.run_scene import read_placement
 from ..model import errors
 from ..physics.logged_simulation import accuracy_from, apply_event, state_digest
 from ..physics.simulation import Simulation
@@ -77,10 +78,17 @@ class Player:
             self._check(event.fields.get('sha256'))
         elif event.kind != 'accuracy' or self._accuracy is None:
             try:
-                apply_event(self.simulation, event.kind, event.fields)
+                apply_event(self.simulation, event.kind, self._arguments(event))
             except errors.ModelError as error:
                 raise error.at(f'event {event.number}') from None
             self.events_repeated += 1
+
+    @staticmethod
+    def _arguments(event: Event) -> dict:
+        """Arguments of an action: the placement of an ``add`` is a text."""
+        if event.kind != 'add':
+            return event.fields
+        return {'placement': read_placement(str(event.fields.get('placement')))}
 
     def _begin(self, event: Event) -> None:
         """Build the simulation of a start event."""

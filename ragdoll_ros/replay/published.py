@@ -7,6 +7,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ..model.ragdoll import WORLD
+from ..model.scene import Scene
 from ..physics.simulation import Simulation
 from ..ros.outputs import Outputs
 from ..ros.process.rclpy_context import rclpy_context
@@ -41,7 +42,7 @@ class PublishedRun(Node):
         super().__init__('ragdoll')
         self.is_over = False
         self._steps, self._pace = steps, pace
-        self._simulation: Simulation | None = None
+        self._scene: Scene | None = None
         self._stamps, self._outputs = Stamps(time.time_ns), Outputs(self)
         self.declare_parameter(BONE_NAMES, [''])
         self._ticker = Ticker(self, Clock(clock_type=ClockType.STEADY_TIME), self._tick)
@@ -54,8 +55,8 @@ class PublishedRun(Node):
             self.is_over = True
             self._ticker.stop()
             return
-        if simulation is not self._simulation:
-            self._simulation = simulation
+        if simulation.scene is not self._scene:
+            self._scene = simulation.scene
             self._outputs.set_scene(simulation.scene, WORLD, 'all')
             self.set_parameters([rclpy.Parameter(BONE_NAMES, value=list(
                 simulation.scene.bone_names))])

@@ -7,8 +7,9 @@ shows; ``tick`` is the number of ticks made before it; the other fields depend o
   first state as ``state``
 - reset: the simulation is back at its start; the same fields without the state, and ``keep_time``
   if simulated time continues
-- push, drive, release, grab, drag, let_go, drive_body, set_state, step, accuracy, go_back: a call
-  of the simulation (physics/logged_simulation.py) with its arguments
+- push, drive, release, grab, drag, let_go, drive_body, set_state, remove, step, accuracy, go_back: a
+  call of the simulation (physics/logged_simulation.py) with its arguments
+- add: likewise; ``placement`` is YAML, as a scene of the doll alone
 - state: ``sha256`` of the state, every HASH_INTERVAL ticks, while there is a subscriber
 - pause, parameters: for information; their effects on the simulation are events of their own
 
@@ -22,7 +23,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from ..files.run_scene import run_scene_text, scene_digest
+from ..files.run_scene import placement_text, run_scene_text, scene_digest
+from ..model.scene import Scene
 from ..physics.logged_simulation import LoggedSimulation, state_digest
 from .latched_topic import LATCHED
 
@@ -38,24 +40,28 @@ class EventLog:
 
     def __init__(self, node: Node) -> None:
         self._events = node.create_publisher(String, '~/events', EVENTS_QOS)
-        self._scene = node.create_publisher(String, '~/scene', LATCHED)
+        self._scenes = node.create_publisher(String, '~/scene', LATCHED)
+        self._scene: Scene | None = None
         self._simulation: LoggedSimulation | None = None
         self._number = self._tick = 0
 
     def set_simulation(self, simulation: LoggedSimulation) -> None:
-        """Log this simulation from now on; no effect if it is logged already."""
+        """Log this simulation from now on, and publish its scene if that is another one."""
+        if simulation.scene is not self._scene:
+            self._scene, text = simulation.scene, run_scene_text(simulation.scene)
+            self._digest = scene_digest(text)
+            self._scenes.publish(String(data=text))
         if simulation is self._simulation:
             return
         self._simulation, simulation.on_event = simulation, self.publish
-        text = run_scene_text(simulation.scene)
-        self._digest = scene_digest(text)
-        self._scene.publish(String(data=text))
         self.publish('start', {**simulation.conditions, 'state': state_digest(simulation.state)})
 
     def publish(self, kind: str, fields: dict) -> None:
         """Publish an event."""
         if kind in ('start', 'reset'):
             fields = {'scene': self._digest, **fields}
+        elif kind == 'add':
+            fields = {'placement': placement_text(fields['placement'])}
         event = {'number': self._number, 'tick': self._tick, 'kind': kind, **fields}
         self._number += 1
         self._events.publish(String(data=json.dumps(event)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
@@ -20,6 +20,7 @@ from rclpy.waitable import Waitable
 from ..files.scene import load_scene
 from ..model import errors
 from ..model.scene import Scene
+from ..model.scene_change import SceneChange
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics, DuplicateNodes, overlaps_text
 from .event_log import EventLog
@@ -151,6 +152,20 @@ class RagdollNode(Node):
         """Reset the simulation, bit-identically to its start, and publish its state."""
         self.simulation.reset(keep_time)
         self._publish_start()
+
+    def change_dolls(self, change: Callable[[Simulation], object]) -> None:
+        """Add or remove dolls by ``change(simulation)``; time goes on, topics and parameters
+        follow. Raises what it raises.
+        """
+        before = self.simulation.scene
+        try:
+            change(self.simulation)
+        finally:
+            after = self.simulation.scene
+            if after is not before:
+                self._node_parameters.follow(SceneChange(before, after))
+                self._set_simulation(self.simulation)
+                self._show_if_paused()
 
     def pause(self, paused: bool) -> None:
         """Pause, or resume."""

@@ -7,6 +7,7 @@ from rclpy.exceptions import InvalidTopicNameException
 from rclpy.validate_topic_name import validate_topic_name
 
 from ...model import errors, rotation
+from ...model.scene_change import SceneChange
 from ...physics.sensors.imu import ImuMount
 
 
@@ -42,6 +43,16 @@ def check_imus(imus: Sequence[str], bones: Sequence[str]) -> None:
             raise errors.WrongForm('imus', bone, 'a name that a topic may contain') from None
         if mounted.count(bone) > 1:
             raise errors.DuplicateName('imus', bone, 'one sensor on a bone')
+
+
+def renamed_imus(imus: Sequence[str], change: SceneChange) -> tuple[str, ...]:
+    """The entries of bones that stay in a scene, by their new names; one empty text for none."""
+    found = []
+    for text in map(str.strip, filter(str.strip, imus)):
+        bone = parse_mount(text, change.before.bone_names).bone
+        if bone in change.bone_names:
+            found.append(change.bone_names[bone] + text[len(bone):])
+    return tuple(found) or ('',)
 
 
 def imu_topic(bone: str) -> str:

@@ -18,7 +18,9 @@ from rclpy.parameter import Parameter
 from ...files.scene import load_scene
 from ...model.errors import RagdollError
 from ...model.scene import Scene
+from ...model.scene_change import SceneChange
 from ...physics.logged_simulation import LoggedSimulation
+from ..imu.imu_parameters import renamed_imus
 from .node_settings import BONE_NAMES, SPECS, NodeSettings, check, scene_defaults
 
 DOUBLES = {name for name, field in SPECS.items() if isinstance(field.default, float)}
@@ -82,6 +84,18 @@ class Parameters:
         self._node.add_pre_set_parameters_callback(as_doubles)
         self._node.add_on_set_parameters_callback(self._on_set)
         self._node.add_post_set_parameters_callback(self._after_set)
+
+    def follow(self, change: SceneChange) -> None:
+        """Take the scene after a change of its dolls: bones keep the sensors and pushes that the
+        parameters give them, by their new names.
+        """
+        names, self.scene = change.bone_names, change.after
+        named = {'pushed_bone': names.get(self.settings.pushed_bone)
+                 or scene_defaults(change.after)['pushed_bone'],
+                 'imus': renamed_imus(self.settings.imus, change)}
+        self.settings = dataclasses.replace(self.settings, **named)
+        self._node.set_parameters([Parameter(name, value=value) for name, value in named.items()])
+        self._set_bone_names()
 
     def is_unchanged_read_only(self, parameter: Parameter) -> bool:
         """Whether it is read-only and has this value, as in a parameter dump that is loaded."""
