@@ -139,19 +139,38 @@ def test_a_lift_does_the_work_of_a_weight(accuracy):
 
 @pytest.mark.parametrize('accuracy', ACCURACIES)
 def test_a_turntable_carries_a_box_that_sticks_around(accuracy):
-    """A low box without slip moves on a circle, at angle w t and speed w r."""
+    """A box that turns with it moves on a circle, w^2 r being below mu g, and takes no work."""
     w, r = 1.2, 0.5
     table = body('table', Box((2, 2, 0.2)), position=(0, 0, -0.1), follow=EXACT)
-    made = scene(body('box', Box((0.2, 0.2, 0.1)), position=(r, 0, 0.05)), table, gravity=G,
-                 friction=math.inf, restitution=0.0)
+    made = scene(body('box', Box((0.2, 0.2, 0.1)), position=(r, 0, 0.05), velocity=(0, w * r, 0),
+                      spin=(0, 0, w)), table, gravity=G, friction=0.5, restitution=0.0)
     with Simulation(made, accuracy=accuracy) as simulation:
-        for tick in range(100):
-            simulation.drive_body('table', twist=(0, 0, 0, 0, 0, w * min(1, tick / 20)))
+        for _ in range(100):
+            simulation.drive_body('table', twist=(0, 0, 0, 0, 0, w))
             simulation.advance()
-        row = simulation.state.rows[0]
+        row, work, excess = simulation.state.rows[0], simulation.work[0], simulation.energy_excess
         turned = rotation.rotation_vector(simulation.state.orientations[1])[2]
-    assert turned == pytest.approx(w * (0.8 + 0.01 * np.arange(20).sum() / 20), abs=1e-9)
-    # The start is one of twenty jerks, each followed by a step of order 2.
-    assert math.hypot(*row[:2]) == pytest.approx(r, abs=1e-4)
-    assert math.atan2(row[1], row[0]) == pytest.approx(turned, abs=1e-4)
-    assert math.hypot(*row[7:9]) == pytest.approx(w * r, abs=1e-4)
+    assert turned == pytest.approx(w, abs=1e-9)
+    # Contact steps are of order 2.
+    assert math.hypot(*row[:2]) == pytest.approx(r, abs=1e-5)
+    assert math.atan2(row[1], row[0]) == pytest.approx(w, abs=1e-5)
+    assert row[7:9] == pytest.approx((-w * r * math.sin(w), w * r * math.cos(w)), abs=1e-5)
+    assert work == pytest.approx(0, abs=1e-5) and excess == pytest.approx(0, abs=1e-5)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_what_leans_on_a_body_follows_each_change_of_its_velocity_at_once(accuracy):
+    """A box leans on a pin that speeds up in twenty jerks: it neither lags nor bounces."""
+    cart = body('cart', Box((1, 1, 0.2)), position=(0, 0, -0.1), follow=EXACT)
+    pin = body('pin', Box((0.05, 0.4, 0.2)), position=(-0.225, 0, 0.1), follow=EXACT)
+    made = scene(body('box', Box((0.4, 0.4, 0.05)), position=(0, 0, 0.025)), pin, cart, gravity=G,
+                 restitution=0.5)
+    with Simulation(made, accuracy=accuracy) as simulation:
+        for tick in range(20):
+            for name in ('pin', 'cart'):
+                simulation.drive_body(name, twist=(0.05 * (tick + 1), 0, 0, 0, 0, 0))
+            state = simulation.advance()
+            assert state.linear_velocities[0] == pytest.approx((0.05 * (tick + 1), 0, 0), abs=1e-8)
+        assert state.positions[0, 0] == pytest.approx(state.positions[2, 0], abs=1e-8)
+        # Each jerk of 0.05 m/s takes half of m du^2, without a bounce.
+        assert simulation.energy_excess == pytest.approx(-20 * 0.05 ** 2 / 2, rel=1e-6)
