@@ -164,6 +164,22 @@ def test_a_robot_bumps_into_a_doll_and_does_no_more_work_than_it_says(tmp_path, 
     assert state.positions[:-1, 0].mean() > start[0] + 0.5, 'the doll was pushed along'
 
 
+def test_a_conveyor_may_jump_back_under_what_it_carries():
+    """Every 0.2 s it is put where it was; the box slides for u / mu g and goes on at its speed."""
+    u, mu = 1.5, 0.4
+    belt = body('belt', Box((8, 2, 0.2)), position=(0, 0, -0.1), follow=EXACT)
+    made = scene(body('box', Box((0.2, 0.3, 0.2)), 3.0, position=(0, 0, 0.1)), belt, gravity=G,
+                 friction=mu, restitution=0.0)
+    with Simulation(made) as simulation:
+        for _ in range(5):
+            simulation.drive_body('belt', pose(0, 0, -0.1), (u, 0, 0, 0, 0, 0))
+            row = simulation.run(20)[-1]
+        assert simulation.measures()['body_jumps_total'] == 4
+    assert row[0, 0] == pytest.approx(u * 1.0 - u * u / (2 * mu * G), rel=1e-5)
+    assert row[0, 7] == pytest.approx(u, abs=1e-9)
+    assert row[1, 0] == pytest.approx(0.3, abs=1e-9)
+
+
 def test_it_sleeps_with_what_lies_on_it_and_wakes_it():
     lift = body('lift', Box((1, 1, 0.2)), position=(0, 0, 0.5), follow=EXACT)
     made = scene(body('box', Box((0.4, 0.4, 0.4)), 5.0, position=(0, 0, 0.8)), lift, gravity=G,

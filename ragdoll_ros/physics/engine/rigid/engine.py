@@ -58,7 +58,7 @@ class RigidEngine:
         self._kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
         """(d,)"""
         self._some_kinematic = bool(self._kinematic.any())
-        self._twisted: set[int] = set()
+        self._twisted: list[int] = []
         """Dolls whose twist has been set since the last interval."""
         self.sleeping = np.zeros(len(scene.dolls), bool)
         self._age = np.full(len(scene.dolls), MAX_AGE)
@@ -132,7 +132,7 @@ class RigidEngine:
         self._clusters.set_twist(doll, self._in_root_axes(coordinates))
         self._clusters.advance(0.0, self.accuracy, ~own)
         self._update_state()
-        self._twisted.add(doll)
+        self._twisted.append(doll)
 
     def continue_from(self, engine: RigidEngine, change: SceneChange) -> None:
         gone, excesses = change.new_dolls < 0, engine.energy_excesses
@@ -150,15 +150,13 @@ class RigidEngine:
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
         clusters, actions = self._clusters, (wrenches, springs, drives)
-        self._last_start = clusters.q.copy(), clusters.v.copy(), duration, actions
+        twisted, self._twisted = self._twisted, []
+        self._last_start = clusters.q.copy(), clusters.v.copy(), duration, actions, twisted
         of_doll = self.cluster_of_doll
         for acts in (*wrenches, *springs, *drives):
             self._wake(of_doll == of_doll[self.scene.doll_of_bone[acts.bone]])
         self._update_clusters(duration)
-        for doll in self._twisted:
-            clusters.follow_twist(doll)
-        self._twisted.clear()
-        self._advance(duration, actions, self.accuracy)
+        self._advance(duration, actions, self.accuracy, twisted)
 
     def overlaps(self, coordinates: GeneralizedState) -> tuple[Overlap, ...]:
         snapshot, start = self.save(), self._last_start
@@ -322,8 +320,12 @@ class RigidEngine:
         return found[~self._kinematic[found].all(axis=1)] if self._some_kinematic else found
 
     def _advance(self, duration: float, actions: tuple[Wrenches, Springs, Drives],
-                 accuracy: Accuracy) -> None:
-        """Advance all clusters that are awake under ``actions``, then remove these."""
+                 accuracy: Accuracy, twisted: Iterable[int]) -> None:
+        """Advance all clusters that are awake under ``actions``, then remove these. Twists of the
+        dolls ``twisted`` have been set.
+        """
+        for doll in twisted:
+            self._clusters.follow_twist(doll)
         acted = self._apply_actions(actions) if any(actions) else ()
         self._clusters.advance(duration, accuracy, self.sleeping)
         for cluster in acted:
@@ -386,7 +388,7 @@ class RigidEngine:
         """
         if self._last_start is None:
             return 0.0
-        q, v, duration, actions = self._last_start
+        q, v, duration, actions, twisted = self._last_start
         finer = dataclasses.replace(self.accuracy, step=ERROR_STEP_RATIO * self.accuracy.step,
                                     flight_error=self.accuracy.flight_error / 100)
         here, there = self.save(), self.state.positions
@@ -394,7 +396,7 @@ class RigidEngine:
         clusters.q[:], clusters.v[:] = q, v
         clusters.gather_state()
         clusters.invalidate()
-        self._advance(duration, actions, finer)
+        self._advance(duration, actions, finer, twisted)
         missed = np.linalg.norm(self.state.positions - there, axis=1).max()
         start = self._last_start
         self.restore(here)
