@@ -99,6 +99,36 @@ def test_a_bat_gives_a_ball_its_speed_and_e_times_it(accuracy, mass):
 
 
 @pytest.mark.parametrize('accuracy', ACCURACIES)
+@pytest.mark.parametrize('w', [3.0, 30.0])
+def test_a_bat_that_turns_hits_by_the_speed_of_its_point(accuracy, w):
+    """Where it meets the ball, at the distance d from its axis, that is w d."""
+    e, mass, center, radius = 0.5, 0.2, 0.8, 0.05
+    bat = body('bat', Box((2.0, 0.01, 0.3)), follow=EXACT)
+    made = scene(body('ball', Sphere(radius), mass, position=(0, center, 0)), bat, restitution=e)
+    with Simulation(made, accuracy=accuracy) as simulation:
+        while not simulation.kinetic_energy:
+            simulation.drive_body('bat', twist=(0, 0, 0, 0, 0, w))
+            row = simulation.advance().rows[0]
+        excess = simulation.energy_excess
+    # The ball's centre is its radius and half the bat's thickness off the bat's middle.
+    sine = (radius + 0.005) / center
+    speed, turned = w * center * math.sqrt(1 - sine ** 2), math.pi / 2 - math.asin(sine)
+    assert row[7:9] == pytest.approx((-(1 + e) * speed * math.sin(turned),
+                                      (1 + e) * speed * math.cos(turned)), rel=1e-8)
+    assert excess == pytest.approx(-mass * (1 - e * e) * speed ** 2 / 2, rel=1e-8)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_a_board_of_a_centimetre_at_100_m_s_passes_nothing(accuracy):
+    made = scene(body('ball', Sphere(0.03), position=(0.43, 0, 0)),
+                 body('board', Box((0.01, 3, 3)), follow=EXACT), restitution=0.5)
+    with Simulation(made, accuracy=accuracy) as simulation:
+        rows = run(simulation, 0.05, board=100.0)
+    assert rows[-1, 0, 7] == pytest.approx(150.0, rel=1e-8)
+    assert (rows[:, 0, 0] > rows[:, 1, 0]).all()
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
 def test_a_box_on_a_conveyor_reaches_its_speed_as_coulomb_says(accuracy):
     """After u / mu g, with u^2 / 2 mu g of slip; the belt does m u^2 of work, half of it heat."""
     u, mu, mass = 1.5, 0.4, 3.0

@@ -130,6 +130,21 @@ def test_it_stands_after_a_fifth_of_a_second_and_is_stale():
     assert rows[-1, 0, 7] == 0
 
 
+@pytest.mark.parametrize('rate', [1000, 50, 5])
+def test_it_goes_on_evenly_however_often_it_is_told(rate):
+    """Poses and twists of one motion, ten in a tick or one in twenty ticks."""
+    made = scene(body('robot', Box((0.4, 0.4, 0.4)), follow=EXACT))
+    with Simulation(made) as simulation:
+        for tick in range(60):
+            here = 0.02 * tick
+            for _ in range(max(1, rate // 100) if tick % max(1, 100 // rate) == 0 else 0):
+                simulation.drive_body('robot', pose(here), (2, 0, 0, 0, 0, 0))
+            row = simulation.advance().rows[0]
+            assert row[0] == pytest.approx(here + 0.02, abs=1e-9)
+            assert row[7] == pytest.approx(2, abs=1e-6)
+        assert simulation.measures()['body_jumps_total'] == 0
+
+
 @pytest.mark.parametrize('accuracy', ACCURACIES)
 def test_a_jump_gives_no_blow_and_is_counted(tmp_path, accuracy):
     """It lands in the legs of the doll, which are moved out of it, gain no speed, and give way."""
