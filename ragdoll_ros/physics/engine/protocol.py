@@ -83,6 +83,36 @@ class Overlap:
 
 
 @dataclass(frozen=True)
+class Impacts:
+    """All c impacts of contact patches in an advance, each between bone ``a`` and bone ``b``, a
+    static body or the ground.
+    """
+
+    a: np.ndarray
+    """(c,) bone indices."""
+    b: np.ndarray
+    """(c,) bone indices, or GROUND for the ground and for static bodies."""
+    bodies: np.ndarray
+    """(c,) indices in Scene.bodies of static bodies, or GROUND for the ground and for bones."""
+    elapsed: np.ndarray
+    """(c,) s since the beginning of the advance."""
+    positions: np.ndarray
+    """(c, 3) m: the patch's center of pressure."""
+    normals: np.ndarray
+    """(c, 3) unit vectors from b to a."""
+    speeds: np.ndarray
+    """(c,) m/s, of approach along the normal at that point."""
+    impulses: np.ndarray
+    """(c,) N s, along the normal."""
+    effective_masses: np.ndarray
+    """(c,) kg, along the normal at that point, of both sides with what hangs on them."""
+    mobilities: np.ndarray
+    """(c, 2) 1/kg: speed of the center of mass of a, and of b, per impulse along the normal."""
+    dropped: int = 0
+    """How many more there were, for which the log had no room."""
+
+
+@dataclass(frozen=True)
 class AppliedWrench:
     """A force (3,) N and a torque (3,) N m on a bone, constant over one step.
 
@@ -277,6 +307,13 @@ class Engine(Protocol):
         """What would overlap at ``coordinates`` by more than a contact, the deepest first; None:
         not found out. The state remains to the bit.
         """
+
+    def log_impacts(self, enabled: bool) -> bool:
+        """Begin or end to log impacts; returns whether the engine can."""
+
+    @property
+    def impacts(self) -> Impacts | None:
+        """Impacts in the last advance(); None: they are not logged."""
 
     def bones_on_ground(self) -> np.ndarray:
         """Which bones (n,) touch the ground."""

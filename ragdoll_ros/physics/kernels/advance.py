@@ -24,6 +24,7 @@ One tick of a cluster, and what its stages read and write:
           update_bracket, next_trial_step   gaps_end -> length of the next trial
       and where something has met:
         impact                   q, gaps -> v                     restitution, friction
+          log_impacts               contacts -> impact_log          where a log is kept
       write_bone_states, sum_dolls   q, v -> bone_states, doll_sums
 
 The broad phase is in engine/rigid/broad_phase.py, sleep in physics/sleeping.py. In all
@@ -130,6 +131,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     start_cycles, ledger = cycles(), ws.stats[0].ledger
     time, impacts, impact_due = 0.0, 0, True
+    cluster.impact_count[0] = 0
     max_impacts = min(MAX_IMPACTS, IMPACT_WORK // len(s.tree) ** 3)
     if max_impacts < MIN_IMPACTS:
         max_impacts = 0
@@ -180,7 +182,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         impact_due = True
         if touched:
             since = cycles()
-            impact_due = impact(s, ws, cluster) > 0
+            impact_due = impact(s, ws, cluster, time) > 0
             impacts += 1
             ledger.impact_cycles += cycles() - since
     write_bone_states(s, ws.step.end, q, v, cluster.bone_states)

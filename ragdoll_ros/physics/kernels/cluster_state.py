@@ -29,6 +29,16 @@ step, m/s. impulse: along the rows, N s or N m s. persistent: whether it existed
 with the velocities start_velocity along its rows and ``spin`` about the normal. island, first_row,
 dof_count: of the solver."""
 
+IMPACT = np.dtype([
+    ('kind', np.int64), ('body_a', np.int64), ('body_b', np.int64), ('patch', np.int64),
+    ('time', float), ('point', float, 3), ('normal', float, 3), ('speed', float),
+    ('impulse', float), ('effective_mass', float), ('mobility', float, 2)], align=True)
+"""A contact patch that met in an impact. kind, body_a, body_b, patch, normal: as of a CONTACT.
+time: since the beginning of the advance, s. point: center of pressure, world, m. speed: of
+approach along the normal, m/s. impulse: along the normal, N s. effective_mass: along the normal at
+the point, of both bodies with what hangs on them, kg. mobility: speed of the center of mass of body
+a, and of b, per impulse along the normal, 1/kg."""
+
 DOLL_SUMS = np.dtype([
     ('energy', float), ('kinetic', float), ('center', float, 3), ('momentum', float, 3),
     ('angular_momentum', float, 3), ('inertia', float, (3, 3))])
@@ -80,14 +90,17 @@ of them, in which flight steps reached their bound. ``ledger``: see above."""
 
 ClusterState = collections.namedtuple(
     'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '
-    'contact_accelerations bone_states doll_sums contact_impulses loads springs')
+    'contact_accelerations bone_states doll_sums contact_impulses impact_count impact_log '
+    'loads springs')
 """The state of a cluster. ``q`` (nq,), ``v`` (nv,): generalized coordinates and velocities, angular
 velocities of roots along the roots' own axes. ``dense_step`` (1,), with its polynomial
 ``dense_output`` (8, nq + nv) and the state derivatives at its ends, ``end_rates`` (2, nq + nv).
 ``stats`` (1,). ``excluded`` (p,): flags of the pairs within dolls, see system.py. ``contacts``: of
 the last step. ``gaps``: see contact/gaps.py. ``contact_accelerations`` (nv,): by contacts in the
 last step, zero unless all of them persist. Output: ``bone_states`` (n, 13), ``doll_sums`` (d,), and
-``contact_impulses`` (n, 3) N s: of contacts on each bone since the start, world frame.
+``contact_impulses`` (n, 3) N s: of contacts on each bone since the start, world frame;
+``impact_log`` (k,): of the last advance, where k is not 0, and ``impact_count`` (1,), how many
+there were, more than k if there was no room for some.
 Input: ``loads``, ``springs``."""
 
 
@@ -101,7 +114,8 @@ def make_cluster_state(system: System, contacts: int = 0) -> ClusterState:
         contacts=np.zeros(contacts, CONTACT), gaps=np.zeros(gap_count(system)),
         contact_accelerations=np.zeros(nv), bone_states=np.zeros((len(system.tree), 13)),
         doll_sums=np.zeros(len(system.doll_masses), DOLL_SUMS),
-        contact_impulses=np.zeros((len(system.tree), 3)), loads=np.zeros(0, LOAD),
+        contact_impulses=np.zeros((len(system.tree), 3)), impact_count=np.zeros(1, np.int64),
+        impact_log=np.zeros(0, IMPACT), loads=np.zeros(0, LOAD),
         springs=np.zeros(0, SPRING))
 
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -12,17 +13,18 @@ from ....model.coordinates import DofLayout
 from ....model.scene import Scene
 from ....model.scene_change import SceneChange
 from ...accuracy import Accuracy
-from ...kernels.cluster_state import LEDGER, STEP_STATS, ClusterState, make_cluster_state
+from ...kernels.cluster_state import IMPACT, LEDGER, STEP_STATS, ClusterState, make_cluster_state
 from ...kernels.compiling.bundle import bind
 from ...kernels.contact_kind import LIMIT
 from ...kernels.loaded import advance as kernels
 from ...kernels.system import System
 from ...kernels.workspace import Workspace, make_workspace
-from ..protocol import GROUND
+from ..protocol import GROUND, Impacts
 from .broad_phase import NO_PAIRS
 from .build_system import build_system, contact_laws, join_systems, make_pairs
-from .contact_points import contact_points
+from .contact_points import bone_pairs, contact_points
 from .doll_states import SNAPSHOT, DollStates, contact_capacity
+from .impact_records import join_impacts, logged_impacts
 from .islands import LARGE_CLUSTER, next_window
 from .static_geoms import NO_KEYS, StaticGeoms
 
@@ -34,6 +36,9 @@ SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'conta
 
 CHECKPOINT = ('q', 'v', 'excluded', 'contact_impulses', 'stats')
 """Fields of the states that a checkpoint stores; all others are computed from them."""
+
+LOGGED_IMPACTS = 8
+"""Room in the log of impacts, for each bone; what meets more often in a tick rattles."""
 
 PARTS_PER_THREAD = 4
 """Parts of the work for each thread; a thread that finishes early takes another part."""
@@ -72,6 +77,14 @@ class Cluster:
         self.state = self.state._replace(loads=loads, springs=springs)
         self.bundles[1][0][:] = bind(self.state)[0]
         self.state.dense_step[:] = 0
+
+    def log_impacts(self, enabled: bool) -> None:
+        """Begin or end to log impacts."""
+        if enabled != bool(len(self.state.impact_log)):
+            self.state = self.state._replace(
+                impact_log=np.zeros(enabled * LOGGED_IMPACTS * len(self.bones), IMPACT),
+                impact_count=np.zeros(1, np.int64))
+            self.bundles[1][0][:] = bind(self.state)[0]
 
 
 class Clusters:
@@ -113,6 +126,8 @@ class Clusters:
         self.of_doll = np.arange(len(scene.dolls))
         """(d,) index in ``members`` of the cluster of each doll."""
         self.static_geoms = StaticGeoms(scene, self.reach())
+        self._logs_impacts = False
+        self._logged: list[Impacts] = []
         self._set_clusters(self.members)
 
     def __iter__(self) -> object:
@@ -150,6 +165,7 @@ class Clusters:
     def advance(self, duration: float, accuracy: Accuracy, sleeping: np.ndarray) -> None:
         """Advance all clusters by ``duration`` s, except those of ``sleeping`` dolls (d,)."""
         jobs, whole = self._jobs, ~sleeping[self._firsts]
+        self._logged = []
         for cluster in self._joined if duration else ():
             place = self.of_doll[cluster.dolls[0]]
             if not whole[place]:
@@ -168,6 +184,20 @@ class Clusters:
         for cluster in self._joined:
             if whole[self.of_doll[cluster.dolls[0]]]:
                 self._scatter_state(cluster)
+        if self._logs_impacts:
+            self._collect_impacts(itertools.compress(self.members, whole), 0.0)
+
+    def log_impacts(self, enabled: bool) -> None:
+        """Begin or end to log impacts."""
+        self._logs_impacts = enabled
+        for cluster in (*self._singles, *self.members):
+            cluster.log_impacts(enabled)
+
+    def impacts(self) -> Impacts | None:
+        """Impacts in the last advance(); None: they are not logged."""
+        if not self._logs_impacts:
+            return None
+        return join_impacts(self._logged)
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
         """Set the velocities of ``dolls`` (d,), whole clusters, to those in ``velocities``, but for
@@ -310,6 +340,16 @@ class Clusters:
             bodies[pair >= 0] = of_geom[system.pairs['b'][pair[pair >= 0]]]
         return bodies
 
+    def _collect_impacts(self, clusters: Iterable[Cluster], since: float) -> None:
+        """Read the logs of clusters that were advanced from ``since`` s on."""
+        for cluster in clusters:
+            count, log = int(cluster.state.impact_count[0]), cluster.state.impact_log
+            if count:
+                log = log[:count]
+                pairs = bone_pairs(log, cluster.bones[cluster.system.tree['bone']],
+                                   np.zeros(len(log), np.int64), self._static_bodies(cluster, log))
+                self._logged.append(logged_impacts(log, pairs, since, count - len(log)))
+
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
         return (self._states.save(), self.departed.copy(), self.members, self.static_geoms.save(),
@@ -408,6 +448,8 @@ class Clusters:
 
     def _set_clusters(self, clusters: list[Cluster]) -> None:
         self.members = clusters
+        for cluster in clusters:
+            cluster.log_impacts(self._logs_impacts)
         for place, cluster in enumerate(clusters):
             self.of_doll[cluster.dolls] = place
         self._joined = [cluster for cluster in clusters if not self._is_single(cluster)]
@@ -463,6 +505,8 @@ class Clusters:
             for island in made.values():
                 if not self._is_single(island):
                     self._scatter_state(island)
+            if self._logs_impacts:
+                self._collect_impacts(made.values(), duration - left)
             cluster.state.q[:] = self.q[cluster.q_indices]
             cluster.state.v[:] = self.v[cluster.v_indices]
             left -= window
@@ -519,6 +563,7 @@ class Clusters:
         keys = self.static_geoms.keys_of(dolls)
         made = (self._join(dolls, pairs, keys) if len(dolls) > 1 or len(keys)
                 else self._singles[dolls[0]])
+        made.log_impacts(self._logs_impacts)
         _invalidate(made)
         return made
 

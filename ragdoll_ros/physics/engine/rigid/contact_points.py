@@ -16,10 +16,17 @@ def contact_points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.nda
     """
     found = np.flatnonzero(contacts['kind'] != LIMIT)
     # take: an index in brackets copies such wide records field by field
-    contacts, first, dt = contacts.take(found), first[found], dt[found]
-    a, other = bone_of_body[first + contacts['body_a']], contacts['body_b']
+    contacts, dt = contacts.take(found), dt[found]
+    touching = bone_pairs(contacts, bone_of_body, first[found], static[found])
+    return contacts, touching, np.where(dt > 0, dt, 1.0)
+
+
+def bone_pairs(records: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,
+               static: np.ndarray) -> np.ndarray:
+    """What touches, (c, 3), as Clusters.contacts() returns it, of CONTACTs or IMPACTs (c,)."""
+    a, other = bone_of_body[first + records['body_a']], records['body_b']
     b = np.where(other < 0, GROUND, bone_of_body[first + other])
-    return contacts, np.stack([a, b, static[found]], 1), np.where(dt > 0, dt, 1.0)
+    return np.stack([a, b, static], 1)
 
 
 def contact_wrenches(contacts: np.ndarray, dt: np.ndarray) -> np.ndarray:

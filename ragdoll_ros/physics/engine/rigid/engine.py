@@ -18,7 +18,16 @@ from ...accuracy import DRAFT, Accuracy
 from ...rigid_body import GroundHeights
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
 from ..doll_totals import DollTotals
-from ..protocol import GROUND, Contacts, Drives, Overlap, Springs, Wrenches, allowed_penetration
+from ..protocol import (
+    GROUND,
+    Contacts,
+    Drives,
+    Impacts,
+    Overlap,
+    Springs,
+    Wrenches,
+    allowed_penetration,
+)
 from .broad_phase import BroadPhase
 from .clusters import Cluster, Clusters
 from .contact_points import contact_wrenches
@@ -63,6 +72,7 @@ class RigidEngine:
         self.sleeping = np.zeros(len(scene.dolls), bool)
         self._age = np.full(len(scene.dolls), MAX_AGE)
         """(d,) intervals since the cluster of each doll was formed."""
+        self._impacts: Impacts | None = None
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]
         """Pairs that overlap at the start: they are excluded until they separate."""
@@ -157,6 +167,7 @@ class RigidEngine:
             self._wake(of_doll == of_doll[self.scene.doll_of_bone[acts.bone]])
         self._update_clusters(duration)
         self._advance(duration, actions, self.accuracy, twisted)
+        self._impacts = self._clusters.impacts()
 
     def overlaps(self, coordinates: GeneralizedState) -> tuple[Overlap, ...]:
         snapshot, start = self.save(), self._last_start
@@ -215,6 +226,15 @@ class RigidEngine:
     @property
     def contact_impulses(self) -> np.ndarray:
         return self._clusters.contact_impulses
+
+    def log_impacts(self, enabled: bool) -> bool:
+        self._clusters.log_impacts(enabled)
+        self._impacts = None
+        return True
+
+    @property
+    def impacts(self) -> Impacts | None:
+        return self._impacts
 
     def bones_on_ground(self) -> np.ndarray:
         return self._clusters.on_ground()

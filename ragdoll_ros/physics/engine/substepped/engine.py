@@ -147,6 +147,13 @@ class SubsteppedEngine(ABC):
     def contact_impulses(self) -> None:
         return None
 
+    def log_impacts(self, enabled: bool) -> bool:
+        return False
+
+    @property
+    def impacts(self) -> None:
+        return None
+
     def bones_on_ground(self) -> np.ndarray:
         contacts, on = self.contacts(), np.zeros(len(self.scene.bones), bool)
         on[contacts.a[contacts.b == GROUND]] = True

@@ -16,6 +16,7 @@ from ..dynamics.mass_matrix import factor_ltl, mass_matrix
 from ..impulses.solve_contacts import solve_contacts
 from ..system import System
 from ..workspace import Workspace
+from .impact_log import log_impacts
 from .momentum import count_contact_impulses
 from .work import account_kinematic_work
 
@@ -59,14 +60,15 @@ def follow_twist(s: System, ws: Workspace, cluster: ClusterState) -> None:
     ws.gaps are current.
     """
     if ws.stats[0].twist_changed:
-        impact(s, ws, cluster)
+        impact(s, ws, cluster, 0.0)
         ws.stats[0].twist_changed = 0
 
 
 @compiled
-def impact(s: System, ws: Workspace, cluster: ClusterState) -> int:
-    """Add to cluster.v the change by the impulses of everything that has met at q by ws.gaps.
-    Returns how many contacts that touch were left out.
+def impact(s: System, ws: Workspace, cluster: ClusterState, time: float) -> int:
+    """Add to cluster.v the change by the impulses of everything that has met at q by ws.gaps, and
+    log what met, ``time`` s after the beginning of the advance, where a log is kept. Returns how
+    many contacts that touch were left out.
     """
     q, v, kin, dyn, contacts = (cluster.q, cluster.v, ws.step.start, ws.step.dynamics,
                                 ws.contacts.found)
@@ -90,4 +92,6 @@ def impact(s: System, ws: Workspace, cluster: ClusterState) -> int:
     count_contact_impulses(s, ws, m, cluster.contact_impulses)
     account_kinematic_work(s, ws, kin, q, m)
     ws.stats[0].impacts += 1
+    if len(cluster.impact_log):
+        log_impacts(s, ws, cluster, kin, m, SLOW, time)
     return touching - m

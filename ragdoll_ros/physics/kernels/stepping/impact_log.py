@@ -1,0 +1,116 @@
+"""The impact log: what met in an impact, for who asked for it; see cluster_state.py, IMPACT.
+
+With the factor L of the mass matrix, H = L^T L, and the Jacobian J of a velocity, J L^-1 = Y: a
+unit impulse along a contact's normal changes that velocity by Y . Y_n, and the normal velocity by
+Y_n . Y_n, whose reciprocal is the effective mass.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..cluster_state import ClusterState
+from ..compiling.decorators import compiled
+from ..contact.find_contacts import patch_end
+from ..contact.jacobian import apply_inverse_factor, contact_jacobian
+from ..contact_kind import LIMIT
+from ..dynamics.body import WORLD
+from ..dynamics.kinematics import Kinematics, root_position
+from ..maths.vectors import Vec3, add, add_scaled, divide, put, vec
+from ..system import System
+from ..workspace import Workspace
+
+NORMAL_ROWS, CENTER_ROWS = 0, 5
+"""First rows of island.Y for the Jacobians of a contact and of a center of mass."""
+
+NORMAL_COLUMNS, CENTER_COLUMNS = 0, 1
+"""Indices of island.support for the columns of these rows."""
+
+
+@compiled
+def log_impacts(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m: int,
+                slowest: float, time: float) -> None:
+    """Enter those of m contacts in the log that have closed faster than ``slowest``, m/s, ``time``
+    s after the beginning of the advance: one entry for each patch, at its center of pressure. After
+    solve_contacts() at cluster.q and ``kin``, with the factor of the mass matrix in dynamics.H.
+    The m contacts are changed.
+    """
+    for i in range(m):
+        c = ws.contacts.found[i]
+        if c.kind == LIMIT or c.impulse[0] <= 0.0:
+            continue
+        merge_patch(ws.contacts.found, i, patch_end(ws.contacts.found, i, m))
+        if c.normal_velocity >= -slowest:
+            continue
+        k = cluster.impact_count[0]
+        cluster.impact_count[0] += 1
+        if k >= len(cluster.impact_log):
+            continue
+        entry = cluster.impact_log[k]
+        entry.kind, entry.body_a, entry.body_b, entry.patch = c.kind, c.body_a, c.body_b, c.patch
+        entry.time, entry.speed, entry.impulse = time, -c.normal_velocity, c.impulse[0]
+        put(entry.point, vec(c.point))
+        put(entry.normal, vec(c.normal))
+        write_mobilities(s, ws, cluster.q, kin, c, entry)
+
+
+@compiled
+def merge_patch(found: np.ndarray, begin: int, end: int) -> None:
+    """Merge the normal impulses of contacts begin to end - 1, of one patch, into the first, with
+    their center of pressure and its velocity; those of the others become zero.
+    """
+    c, total, velocity, point = found[begin], 0.0, 0.0, (0.0, 0.0, 0.0)
+    for j in range(begin, end):
+        share = found[j].impulse[0]
+        total += share
+        velocity += share * found[j].normal_velocity
+        point = add_scaled(point, share, vec(found[j].point))
+        found[j].impulse[0] = 0.0
+    c.impulse[0], c.normal_velocity = total, velocity / total
+    put(c.point, divide(point, total))
+
+
+@compiled
+def write_mobilities(s: System, ws: Workspace, q: np.ndarray, kin: Kinematics, c: np.record,
+                     entry: np.record) -> None:
+    """Write the effective mass of contact c along its normal, and the mobilities of its bodies'
+    centers of mass, to its entry in the log.
+    """
+    island, point = ws.island, vec(c.point)
+    for side in range(2):
+        body = entry.body_a if side == 0 else entry.body_b
+        entry.mobility[side] = 0.0
+        if body == WORLD:
+            continue
+        root = root_position(q, s.tree[s.body_root[body]].q_start)
+        write_rows(s, ws, q, kin, c, CENTER_ROWS, CENTER_COLUMNS, body, WORLD,
+                   add(root, vec(kin.positions[body])))
+        columns = c.dof_count
+        write_rows(s, ws, q, kin, c, NORMAL_ROWS, NORMAL_COLUMNS, entry.body_a, entry.body_b,
+                   point)
+        squares = 0.0
+        for e in range(CENTER_ROWS, CENTER_ROWS + 3):
+            change = 0.0
+            for n in range(columns):
+                j = island.support[CENTER_COLUMNS, n]
+                change += island.Y[e, n] * island.Y[NORMAL_ROWS, island.place[j]]
+            squares += change * change
+        entry.mobility[side] = math.sqrt(squares)
+    inverse = 0.0
+    for n in range(c.dof_count):
+        inverse += island.Y[NORMAL_ROWS, n] ** 2
+    entry.effective_mass = 1 / inverse
+
+
+@compiled
+def write_rows(s: System, ws: Workspace, q: np.ndarray, kin: Kinematics, c: np.record, row: int,
+               index: int, body_a: int, body_b: int, point: Vec3) -> None:
+    """Write J L^-1 of the velocity of body_a against body_b at ``point``, m, along normal and
+    tangents of c, to island.Y from ``row`` on, and its columns to island.support[index].
+    """
+    c.first_row, c.body_a, c.body_b = row, body_a, body_b
+    put(c.point, point)
+    put(c.friction_point, point)
+    contact_jacobian(s, kin, q, ws.island, c, index, ws.step.v_change, ws.step.v_change)
+    apply_inverse_factor(s.dof_parent, ws.step.dynamics.H, ws.island, index, c)
