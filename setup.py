@@ -18,8 +18,9 @@ EXECUTABLES = {
     'ragdoll_falls': 'ragdoll_ros.falls.command:main',
     'ragdoll_person': 'ragdoll_ros.people.command:main',
 }
-CONFIG, RECIPES, LAUNCH = (sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
-                           for folder in ('config', 'config/recipes', 'launch'))
+CONFIG, RECIPES, LIMITS, LAUNCH = (
+    sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
+    for folder in ('config', 'config/recipes', 'config/limits', 'launch'))
 LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
 """What `ros2 run` finds in a wheel's lib/ragdoll_ros: the way to the script that pip put in bin."""
 
@@ -41,7 +42,8 @@ class BuildWithConfig(build_py):
         return outputs + [str(target) for _, target in self._config()]
 
     def _config(self) -> list[tuple[str, Path]]:
-        return [(source, Path(self.build_lib, NAME, source)) for source in CONFIG + RECIPES]
+        return [(source, Path(self.build_lib, NAME, source))
+                for source in CONFIG + RECIPES + LIMITS]
 
 
 class InstallDataWithLaunchers(Distribution().get_command_class('install_data')):
@@ -76,6 +78,7 @@ setup(
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', CONFIG),
         (f'share/{NAME}/config/recipes', RECIPES),
+        (f'share/{NAME}/config/limits', LIMITS),
         (f'share/{NAME}/launch', LAUNCH),
     ],
     cmdclass={'build_py': BuildWithConfig, 'install_data': InstallDataWithLaunchers},

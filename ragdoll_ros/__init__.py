@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .files.doll import load_doll as load_doll
     from .files.doll import save_doll as save_doll
+    from .files.limits import load_limits as load_limits
     from .files.scene import load_scene as load_scene
     from .files.scene import save_scene as save_scene
     from .model.compound import Compound as Compound
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from .model.static_body import StaticBody as StaticBody
     from .people.person import person as person
     from .physics.run_many import run_many as run_many
+    from .physics.sensors.head_injury import head_injury_criterion as head_injury_criterion
     from .physics.simulation import Simulation as Simulation
     from .recordings.recording import Recorder as Recorder
     from .recordings.save import save_recording as save_recording
@@ -45,9 +47,11 @@ _MODULES = {
     'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
     'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
-    'State': 'model.state', 'StaticBody': 'model.static_body', 'load_doll': 'files.doll',
-    'load_scene': 'files.scene', 'person': 'people.person', 'run_many': 'physics.run_many',
-    'save_doll': 'files.doll', 'save_recording': 'recordings.save', 'save_scene': 'files.scene'}
+    'State': 'model.state', 'StaticBody': 'model.static_body',
+    'head_injury_criterion': 'physics.sensors.head_injury', 'load_doll': 'files.doll',
+    'load_limits': 'files.limits', 'load_scene': 'files.scene', 'person': 'people.person',
+    'run_many': 'physics.run_many', 'save_doll': 'files.doll',
+    'save_recording': 'recordings.save', 'save_scene': 'files.scene'}
 """The module that defines each public name; the static imports above are for type checkers."""
 __all__ = list(_MODULES)
 

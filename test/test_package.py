@@ -388,7 +388,7 @@ def test_colcon_build_runs_the_node(ros, environment, tmp_path, option):
         run('colcon', 'build', *option, cwd=tmp_path, PATH=path)
     prefix = tmp_path / 'install/ragdoll_ros'
     assert (prefix / 'share/ament_index/resource_index/packages/ragdoll_ros').is_file()
-    for folder in ('config', 'config/recipes', 'launch'):
+    for folder in ('config', 'config/recipes', 'config/limits', 'launch'):
         shipped = {file.name for file in (ROOT / folder).glob('*.*')}
         assert {file.name for file in prefix.glob(f'share/ragdoll_ros/{folder}/*.*')} == shipped
     assert {file.name for file in (prefix / 'lib/ragdoll_ros').iterdir()} == set(EXECUTABLES)

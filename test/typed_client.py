@@ -31,7 +31,9 @@ from ragdoll_ros import (
     Sphere,
     State,
     StaticBody,
+    head_injury_criterion,
     load_doll,
+    load_limits,
     load_scene,
     person,
     run_many,
@@ -64,13 +66,16 @@ def fall(scene: Scene, folder: Path) -> State:
         simulation.push(Drive(scene.bone_names[0], velocity=(1.0, 0.0, 0.0)), channel='drive')
         simulation.grab('hand', scene.bone_names[0], (0.0, 0.0, 0.0))
         simulation.let_go('hand')
+        simulation.record_impacts(load_limits())
         for _ in range(3):
             state: State = simulation.advance()
             recorder.take(simulation)
+        blows: list[float] = [impact.ratio for impact in simulation.impacts]
         nanoseconds: int = simulation.time
         asleep: bool = simulation.asleep
         measures: dict[str, float] = simulation.measures()
-    assert nanoseconds and not asleep and measures
+    assert nanoseconds and not asleep and measures and not blows
+    assert head_injury_criterion([1000.0, 1000.0], rate=1000.0, window=0.015) > 0
     names: tuple[str, ...] = riders.names
     positions: np.ndarray = riders.poses(state).position
     assert len(names) == len(positions)

@@ -6,7 +6,7 @@ import time
 from functools import partial
 from pathlib import Path
 
-from ..files.config import recipe_names
+from ..files.config import RECIPES, names_in
 from ..model.errors import RagdollError
 from . import cluster, describe, pool
 from .formats.registry import FORMATS
@@ -66,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
         'ragdoll_falls', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('recipe', help='a YAML file, or a recipe of config/recipes/: '
-                        + ', '.join(recipe_names()))
+                        + ', '.join(names_in(RECIPES)))
     parser.add_argument('-o', '--out', type=Path, required=True, metavar='FOLDER',
                         help='output folder of the data set')
     parser.add_argument('--count', type=int, default=100, help='number of falls (%(default)s)')

@@ -8,6 +8,9 @@ from ..model import errors
 RECIPES = 'recipes'
 """Folder of config/ with the recipes of falls."""
 
+LIMITS = 'limits'
+"""Folder of config/ with biomechanical limits."""
+
 
 def config_folder() -> Path:
     """config/ of the checkout, else of the ROS prefix, else of the package."""
@@ -26,14 +29,16 @@ def scene_names() -> list[str]:
                   if re.search(r'^(dolls|bones):', path.read_text(), re.MULTILINE))
 
 
-def recipe_names() -> list[str]:
-    """Names of the shipped recipes of falls."""
-    return sorted(path.stem for path in (config_folder() / RECIPES).glob('*.yaml'))
+def names_in(folder: str) -> list[str]:
+    """Names of the shipped files of a folder, RECIPES or LIMITS; of '': of scenes and dolls."""
+    if not folder:
+        return scene_names()
+    return sorted(path.stem for path in (config_folder() / folder).glob('*.yaml'))
 
 
 def find(name: str, beside: Path | None = None, folder: str = '') -> Path:
     """Path of a file given by path (also relative to ``beside``) or by name in ``folder`` of
-    config/: '' or RECIPES.
+    config/: '', RECIPES or LIMITS.
     """
     choices = [Path(os.path.expanduser(name))]
     if beside is not None:
@@ -42,5 +47,4 @@ def find(name: str, beside: Path | None = None, folder: str = '') -> Path:
     for path in choices:
         if os.path.isfile(path):
             return path
-    names = recipe_names() if folder == RECIPES else scene_names()
-    raise errors.Unreadable('', name, f'a file, or one of {", ".join(names)}')
+    raise errors.Unreadable('', name, f'a file, or one of {", ".join(names_in(folder))}')

@@ -18,13 +18,13 @@ _NAMED = {'exclusiveMinimum': errors.NotPositive, 'minimum': errors.OutOfRange,
 Made = TypeVar('Made')
 
 
-MARKS = {'scene': 'dolls', 'doll': 'bones', 'recipe': 'who'}
+MARKS = {'scene': 'dolls', 'doll': 'bones', 'recipe': 'who', 'limits': 'regions'}
 """The key without which a file is none of the kind. Its values then are in no error: whoever may
 set a node's scene could read any file by them."""
 
 
 def is_marked(data: object, schema: str) -> TypeGuard[dict]:
-    """Whether data may be meant as a scene, a doll or a recipe of falls."""
+    """Whether data may be meant as a scene, a doll, a recipe of falls or limits."""
     return isinstance(data, dict) and MARKS[schema] in data
 
 
@@ -33,9 +33,9 @@ def schema_errors(schema: str, data: object) -> list[ModelError]:
     if not is_marked(data, schema):
         form = 'a mapping' if isinstance(data, dict) else 'no mapping'
         others = [other for other in MARKS if is_marked(data, other)]
-        is_other = f', but a {others[0]}' if others else ''
+        is_other = f', but {_kind(others[0])}' if others else ''
         return [errors.WrongForm('', f'{form} without {MARKS[schema]}{is_other}',
-                                 f'a {schema}, which has {MARKS[schema]}')]
+                                 f'{_kind(schema)}, with {MARKS[schema]}')]
     found = []
     for error in _validator(schema).iter_errors(data):
         if error.validator == 'oneOf' and not isinstance(error.instance, dict):
@@ -47,6 +47,11 @@ def schema_errors(schema: str, data: object) -> list[ModelError]:
         kind = _NAMED.get(error.validator, errors.WrongForm)
         found.append(kind(path, _wrong(error), _expected(error)))
     return sorted(found, key=lambda error: error.path)
+
+
+def _kind(schema: str) -> str:
+    """A kind of file in words."""
+    return schema if schema == 'limits' else f'a {schema}'
 
 
 def _wrong(error: jsonschema.ValidationError) -> object:

@@ -30,8 +30,9 @@ _Loader.add_implicit_resolver(
     list('-+0123456789'))
 
 
-OURS = re.compile(r'^(dolls|bones|who):', re.MULTILINE)
-"""Found in every scene, doll and recipe: text without it may be a secret, and is in no error."""
+OURS = re.compile(r'^(dolls|bones|who|regions):', re.MULTILINE)
+"""Found in every scene, doll, recipe and limits: text without it may be a secret, and is in no
+error."""
 
 A_SCENE = 'a scene or a doll in YAML'
 

@@ -21,6 +21,7 @@ One tick of a cluster, and what its stages read and write:
             set_slip_friction       middle, impulses -> friction points of faces that slip
             solve_contacts          contacts, v_free -> v_change, correction   islands
           finish_step            v_end, correction -> q_end, v_end, gaps_end   position correction
+          log_impacts               contacts -> impact_log          where impacts are not sought
           update_bracket, next_trial_step   gaps_end -> length of the next trial
       and where something has met:
         impact                   q, gaps -> v                     restitution, friction

@@ -93,5 +93,5 @@ def impact(s: System, ws: Workspace, cluster: ClusterState, time: float) -> int:
     account_kinematic_work(s, ws, kin, q, m)
     ws.stats[0].impacts += 1
     if len(cluster.impact_log):
-        log_impacts(s, ws, cluster, kin, m, SLOW, time)
+        log_impacts(s, ws, cluster, m, False, SLOW, time)
     return touching - m

@@ -29,13 +29,20 @@ NORMAL_COLUMNS, CENTER_COLUMNS = 0, 1
 
 
 @compiled
-def log_impacts(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m: int,
+def log_impacts(s: System, ws: Workspace, cluster: ClusterState, m: int, in_step: bool,
                 slowest: float, time: float) -> None:
     """Enter those of m contacts in the log that have closed faster than ``slowest``, m/s, ``time``
-    s after the beginning of the advance: one entry for each patch, at its center of pressure. After
-    solve_contacts() at cluster.q and ``kin``, with the factor of the mass matrix in dynamics.H.
-    The m contacts are changed.
+    s after the beginning of the advance: one entry for each patch, at its center of pressure.
+
+    After solve_contacts() of an impact, or, ``in_step``, of a step that does not seek impacts, in
+    which what has no contact as it begins meets. The m contacts are changed.
     """
+    kin, q = ws.step.start, cluster.q
+    if in_step:
+        kin, q = ws.step.middle, ws.step.q_middle
+        for i in range(m):
+            if ws.contacts.found[i].persistent:
+                ws.contacts.found[i].impulse[0] = 0.0
     for i in range(m):
         c = ws.contacts.found[i]
         if c.kind == LIMIT or c.impulse[0] <= 0.0:
@@ -52,7 +59,7 @@ def log_impacts(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics
         entry.time, entry.speed, entry.impulse = time, -c.normal_velocity, c.impulse[0]
         put(entry.point, vec(c.point))
         put(entry.normal, vec(c.normal))
-        write_mobilities(s, ws, cluster.q, kin, c, entry)
+        write_mobilities(s, ws, q, kin, c, entry)
 
 
 @compiled

@@ -14,6 +14,8 @@ from ..dynamics.kinematics import integrate_positions
 from ..system import System
 from ..workspace import Workspace
 from .contact_step import MAX_PENETRATION, STEP_TOLERANCE, contact_step, finish_step
+from .impact import SLOW
+from .impact_log import log_impacts
 from .momentum import (REMOVABLE, count_contact_impulses, internal_kinetic_energy, remove_energy,
                        total_energy)
 from .position_correction import PAID_SHARE
@@ -129,6 +131,8 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         break
     count_contact_impulses(s, ws, m, cluster.contact_impulses)
     accept_step(ws, cluster, m, length, length > 0.1 * h)
+    if not seek and len(cluster.impact_log):
+        log_impacts(s, ws, cluster, m, True, SLOW, since)
     return length, hit
 
 

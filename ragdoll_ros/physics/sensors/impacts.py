@@ -1,0 +1,128 @@
+"""Impacts of bones in figures: what met, and the force that a stated contact law gives.
+
+Bodies are rigid: an impact has a speed of approach v, an impulse and an effective mass mu, and no
+force. The contact law is a linear spring k of the body's region between them (ISO/TS 15066, annex
+A): the force is a half-sine of peak v sqrt(mu k) and duration pi sqrt(mu / k). Where both sides
+have a region, their springs are in series. The spring gives back what it takes: the impulse of its
+pulse is 2 mu v, that of the simulation (1 + e) mu v with a restitution e and without friction; the
+peak, which is at the end of the compression, does not depend on that.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model.biomechanical_limits import BiomechanicalLimits, BodyRegion
+from ...model.scene import SECOND, Scene
+from ...model.vectors import Vector
+from ..engine.protocol import Impacts
+from .head_injury import half_sine_head_injury
+
+GROUND_NAME = 'ground'
+
+
+@dataclass(frozen=True)
+class Impact:
+    """An impact of a bone; of two bones that meet each has its own.
+
+    Without a region there is no contact law: the force and what follows from it are NaN.
+    """
+
+    time: int
+    """ns of simulated time."""
+    doll: str
+    bone: str
+    """As in Scene.bone_names."""
+    region: str
+    """Of the body, by the limits; '' if the bone has none."""
+    against: str
+    """'ground', or the name of the body or bone that it meets."""
+    point: Vector
+    """m, world frame: centre of pressure."""
+    normal: Vector
+    """Unit vector, world frame, into the bone."""
+    speed: float
+    """m/s: speed of approach v along the normal at the point."""
+    effective_mass: float
+    """kg: mu, along the normal at the point, of both sides with what hangs on them by joints."""
+    impulse: float
+    """N s, along the normal."""
+    mobility: float
+    """1/kg: change of velocity of the bone's centre of mass per impulse along the normal."""
+    stiffness: float
+    """N/m: k of the contact law."""
+    limit: float
+    """N: of the region's peak force."""
+
+    @property
+    def peak_force(self) -> float:
+        """Peak force of the contact law, N: v sqrt(mu k)."""
+        return self.speed * math.sqrt(self.effective_mass * self.stiffness)
+
+    @property
+    def duration(self) -> float:
+        """Duration of the contact law's pulse, s: pi sqrt(mu / k)."""
+        return math.pi * math.sqrt(self.effective_mass / self.stiffness)
+
+    @property
+    def ratio(self) -> float:
+        """Peak force over the region's limit."""
+        return self.peak_force / self.limit
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Peak of the acceleration of the bone's centre of mass by the pulse, m/s^2."""
+        return self.peak_force * self.mobility
+
+    def head_injury(self, window: float) -> float:
+        """Head injury criterion of the contact law's pulse, s g^2.5; ``window``: HIC15, HIC36."""
+        return half_sine_head_injury(self.peak_acceleration, self.duration, window)
+
+
+class ImpactReader:
+    """Makes Impacts of a scene's bones from those that an engine logs."""
+
+    def __init__(self, scene: Scene, limits: BiomechanicalLimits) -> None:
+        self._scene, self.limits = scene, limits
+        self._regions = [limits.region_of(bone.name) for bone in scene.bones]
+
+    def read(self, found: Impacts, begin: int) -> list[Impact]:
+        """Impacts of an advance that began at ``begin``, ns; of two bones that of a comes first."""
+        made = []
+        for row in range(len(found.a)):
+            a, b = int(found.a[row]), int(found.b[row])
+            made.append(self._impact(found, row, begin, a, b, 1.0))
+            if b >= 0:
+                made.append(self._impact(found, row, begin, b, a, -1.0))
+        return made
+
+    def _impact(self, found: Impacts, row: int, begin: int, bone: int, other: int,
+                sign: float) -> Impact:
+        """The impact of ``bone`` in a row; ``sign``: 1 if it is a, -1 if it is b."""
+        scene, own = self._scene, self._region(bone)
+        springs = [one.stiffness for one in (own, self._region(other)) if one]
+        stiffness = 1 / sum(1 / k for k in springs) if own else math.nan
+        return Impact(
+            begin + round(found.elapsed[row] * SECOND),
+            scene.dolls[scene.doll_of_bone[bone]].name, scene.bone_names[bone],
+            self._regions[bone], self._name(other, int(found.bodies[row])),
+            _vector(found.positions[row]), _vector(sign * found.normals[row]),
+            float(found.speeds[row]), float(found.effective_masses[row]),
+            float(found.impulses[row]), float(found.mobilities[row, 0 if sign > 0 else 1]),
+            stiffness, own.transient_force if own else math.nan)
+
+    def _region(self, bone: int) -> BodyRegion | None:
+        """The region of a bone; None if there is none, or no bone."""
+        return self.limits.regions.get(self._regions[bone]) if bone >= 0 else None
+
+    def _name(self, bone: int, body: int) -> str:
+        """Name of what is met: a bone, a static body or the ground."""
+        if bone >= 0:
+            return self._scene.bone_names[bone]
+        return self._scene.bodies[body].name if body >= 0 else GROUND_NAME
+
+
+def _vector(row: np.ndarray) -> Vector:
+    return float(row[0]), float(row[1]), float(row[2])
