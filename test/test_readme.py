@@ -161,11 +161,14 @@ def test_falls_part_at_the_touch():
 
 
 @pytest.mark.parametrize('text', blocks('yaml'))
-def test_yaml_is_a_scene_a_doll_or_a_recipe(tmp_path, text):
+def test_yaml_is_a_scene_a_doll_a_recipe_or_limits(tmp_path, text):
     path = tmp_path / 'mine.yaml'
     path.write_text(text)
     if re.search('^who:', text, re.M):
         assert next(generate(load_recipe(path), [0])).failure == ''
+        return
+    if re.search('^regions:', text, re.M):
+        assert ragdoll_ros.load_limits(path).regions
         return
     with ragdoll_ros.Simulation(ragdoll_ros.load_scene(str(path))) as simulation:
         assert np.isfinite(simulation.advance().positions).all()

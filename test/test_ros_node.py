@@ -89,9 +89,10 @@ def test_a_node_with_listeners_leaves_the_simulation_its_bits(make_node, peer):
     heard = [peer.collect(kind, topic) for kind, topic in (
         (PoseArray, 'ragdoll/poses'), (MultiDOFJointState, 'ragdoll/state'),
         (JointState, 'joint_states'), (MarkerArray, 'ragdoll/markers'),
-        (MultiDOFJointState, 'ragdoll/contact_wrenches'))]
+        (MultiDOFJointState, 'ragdoll/contact_wrenches'),
+        (DiagnosticArray, 'ragdoll/impacts'))]
     peer.wait_heard(node, POSES, '/ragdoll/state', '/joint_states', MARKERS,
-                    '/ragdoll/contact_wrenches')
+                    '/ragdoll/contact_wrenches', '/ragdoll/impacts')
     alone = digest(plain(320))
     assert digest(played(node, 320)) == alone
     node.reset()

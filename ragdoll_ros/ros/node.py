@@ -24,6 +24,7 @@ from ..model.scene_change import SceneChange
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics, DuplicateNodes, overlaps_text
 from .event_log import EventLog
+from .impacts.publisher import ImpactPublisher
 from .imu.publishers import ImuPublishers
 from .inputs.body_subscriptions import BodySubscriptions
 from .inputs.input_counts import InputCounts
@@ -80,6 +81,7 @@ class RagdollNode(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._stamps = Stamps(self._ros_time)
         self._outputs, self._imus = Outputs(self), ImuPublishers(self)
+        self._impacts = ImpactPublisher(self)
         self._event_log = EventLog(self)
         self.inputs = PushSubscriptions(self, self.input_counts)
         self.states = StateSubscription(self, self.input_counts, self._show_if_paused)
@@ -134,6 +136,7 @@ class RagdollNode(Node):
         ``due``: when it was due, ns of the steady clock; default: now.
         """
         start = time.monotonic_ns()
+        self._impacts.start(self.simulation)
         is_good = self.recovery.advance(self.settings.dump_directory)
         if is_good:
             self._event_log.count_tick()
@@ -143,6 +146,7 @@ class RagdollNode(Node):
         self._publish()
         if is_good:
             self._imus.publish(self.simulation, self.stamp)
+            self._impacts.publish(self.simulation, self.stamp)
         self._ticker.set_idle(self.simulation.asleep and not (
             self._outputs.has_subscribers or self._imus.has_subscribers))
         lag = 0.0 if due is None else start - due
@@ -262,6 +266,7 @@ class RagdollNode(Node):
         self._outputs.set_scene(simulation.scene, self.settings.frame_id,
                                 self.settings.publish_tf)
         self._imus.configure(simulation.scene, self.settings)
+        self._impacts.configure(self.settings)
         self.interactive.set_simulation(simulation, self.settings)
 
     def _log_start(self) -> None:
@@ -270,6 +275,7 @@ class RagdollNode(Node):
             self.get_logger().warning(f'overlaps at the start: {overlaps}')
 
     def _replace(self, simulation: Simulation) -> None:
+        self._impacts.stop()
         self.simulation.close()
         self._set_simulation(simulation)
 
@@ -303,6 +309,8 @@ class RagdollNode(Node):
                 self._publish()
         if 'accuracy' in changed:
             self.simulation.accuracy = settings.accuracy
+        if 'impact_limits' in changed:
+            self._impacts.configure(settings)
         if changed & IMU_SETTINGS:
             self._imus.configure(self.simulation.scene, settings)
             if self.simulation.samples_per_tick != settings.samples_per_tick:
@@ -319,6 +327,7 @@ class RagdollNode(Node):
                 'lost_time': ticker.dropped_time / 1e9, 'dropped_ticks': ticker.dropped_ticks,
                 'stamp_pace': stamp_factor, 'namesakes': self._duplicate_nodes.count,
                 'unheard_cmd_vel': self.inputs.cmd_vel.unheard,
+                'impact_ratios': self._impacts.status,
                 'humans': self._outputs.humans.status,
                 'simulation_interfaces': self.simulation_interfaces.status,
                 'stamp_of_zero': self.stamp - round(self.simulation.time / stamp_factor),

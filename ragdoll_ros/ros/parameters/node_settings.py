@@ -5,6 +5,7 @@ import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 
+from ...files.limits import DEFAULT_LIMITS, load_limits
 from ...model import errors
 from ...model.drive import FORCE_PER_SPEED, TORQUE_PER_SPEED
 from ...model.ragdoll import WORLD
@@ -72,6 +73,9 @@ class NodeSettings:
     workers: int = _parameter(
         1, 'Threads for dolls that do not touch, 0: one per core; a change restarts the scene',
         (0, MAX_WORKERS))
+    impact_limits: str = _parameter(
+        DEFAULT_LIMITS, 'Limits to which ~/impacts compares: a name in config/limits/ or a path',
+        constraints='a file or the name of a shipped one')
     imus: tuple[str, ...] = _parameter(
         ('',), 'Bones with an inertial sensor, each published on ~/imu/<bone>/data_raw: '
         "'bone', 'bone x y z' (m from its centre of mass, bone frame) or "
@@ -143,6 +147,7 @@ def _wrong_words(settings: NodeSettings) -> Iterator[errors.RagdollError]:
         if getattr(settings, name) not in words:
             yield errors.OutOfRange(name, getattr(settings, name), 'one of ' + ', '.join(words))
     yield from _raised(lambda: check_engine(settings.engine))
+    yield from _raised(lambda: load_limits(settings.impact_limits))
 
 
 def _wrong_names(settings: NodeSettings, scene: Scene) -> Iterator[errors.RagdollError]:

@@ -1,0 +1,1 @@
+"""Impacts of bones on ~/impacts."""

@@ -1,0 +1,83 @@
+"""Publisher of ~/impacts, and of the worst impacts for /diagnostics."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+from ...files.limits import load_limits
+from ...model.errors import RagdollError
+from .messages import to_impacts
+
+if TYPE_CHECKING:
+    from ...physics.simulation import Simulation
+    from ..parameters.node_settings import NodeSettings
+
+DEPTH = 100
+"""Queue depth: ticks of a second."""
+
+
+class ImpactPublisher:
+    """Has impacts recorded while ~/impacts is subscribed, and publishes those of each tick."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(DiagnosticArray, '~/impacts', DEPTH)
+        self._recorded: Simulation | None = None
+        """The simulation whose impacts are recorded."""
+        self._refused: Simulation | None = None
+        """The simulation whose engine finds none."""
+        self._worst: dict[str, float] = {}
+        """Largest ratio to the limit by region since the start of the run."""
+        self._run = -1
+
+    def configure(self, settings: NodeSettings) -> None:
+        """Take frame and limits of these settings."""
+        self._frame, self._limits = settings.frame_id, load_limits(settings.impact_limits)
+        self.stop()
+
+    def stop(self) -> None:
+        """End the recording, as before the simulation is closed; start() begins it anew."""
+        if self._recorded is not None:
+            self._recorded.record_impacts(None)
+        self._recorded = self._refused = None
+        self._worst, self._run = {}, -1
+
+    def start(self, simulation: Simulation) -> None:
+        """Before a tick: begin or end the recording as there are subscribers or none."""
+        if not self._publisher.get_subscription_count():
+            if self._recorded is not None or self._refused is not None:
+                self.stop()
+        elif simulation not in (self._recorded, self._refused):
+            try:
+                simulation.record_impacts(self._limits)
+                self._recorded = simulation
+            except RagdollError:
+                self._refused = simulation
+                self._node.get_logger().warning(f'~/impacts: {self.status}')
+
+    def publish(self, simulation: Simulation, stamp: int) -> None:
+        """Publish the impacts of the last tick, which ends at ``stamp``, ns, if it has any."""
+        if simulation is not self._recorded:
+            return
+        if self._run != simulation.reset_count:
+            self._worst, self._run = {}, simulation.reset_count
+        impacts = simulation.impacts
+        if not impacts:
+            return
+        self._publisher.publish(to_impacts(self._frame, stamp, impacts, self._limits))
+        for impact in impacts:
+            if impact.region:
+                self._worst[impact.region] = max(self._worst.get(impact.region, 0.0), impact.ratio)
+
+    @property
+    def status(self) -> str:
+        """For /diagnostics: the largest ratios to the limits by region, or why there are none."""
+        if self._refused is not None:
+            return (f'the engine {self._refused.engine_name} finds no times of impact, so that '
+                    'there are none; the engine rigid does')
+        if self._recorded is None:
+            return 'not recorded: nobody subscribes to ~/impacts'
+        worst = sorted(self._worst.items(), key=lambda item: -item[1])
+        return ', '.join(f'{region} {ratio:.3g}' for region, ratio in worst) or 'none'
