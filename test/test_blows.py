@@ -305,9 +305,12 @@ def test_impacts_are_recorded_on_after_a_reset_and_after_going_back():
         for back in (lambda: None, simulation.reset, lambda: simulation.go_back(before)):
             back()
             found = []
+            assert simulation.impacts == ()
             for _ in range(20):
                 simulation.advance()
                 found += simulation.impacts
+                if found:
+                    break
             counts.append([hit.time for hit in found])
         assert len(counts[0]) == 1 and counts[0] == counts[1] == counts[2]
 

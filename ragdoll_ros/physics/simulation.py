@@ -27,7 +27,7 @@ from .actions.push_queue import PushQueue
 from .engine.protocol import Contacts, Drives, Engine, Overlap, Springs, Wrenches
 from .engine.registry import resolve_engine
 from .rigid_body import GroundHeights, JointGap
-from .sensors.impacts import Impact, ImpactReader
+from .sensors.impacts import Impact, ImpactRecorder
 from .sleeping import SleepDetector
 from .stability import StabilityTest
 from .swing.pose import SwingState
@@ -96,9 +96,7 @@ class Simulation:
         self.engine_name, self.engine_reason = choice.name, choice.reason
         """Name of the engine, and why 'auto' did not select rigid."""
         self._make = partial(choice.make, workers=int(workers))
-        self._impact_reader: ImpactReader | None = None
-        self._impacts: list[Impact] = []
-        self._dropped_impacts = 0
+        self._impact_recorder: ImpactRecorder | None = None
         self._placed: GeneralizedState | None = None
         self._overlaps: tuple[Overlap, ...] | None = None
         if any(placement.angles or placement.rates for placement in scene.dolls):
@@ -250,25 +248,21 @@ class Simulation:
         """
         if not self._engine.log_impacts(limits is not None) and limits is not None:
             raise errors.WrongForm('engine', self.engine_name, 'rigid, which finds times of impact')
-        self._impact_reader = ImpactReader(self.scene, limits) if limits is not None else None
-        self._impacts, self._dropped_impacts = [], 0
+        self._impact_recorder = None if limits is None else ImpactRecorder(self.scene, limits)
 
     @property
     def impacts(self) -> tuple[Impact, ...]:
         """Impacts of bones in the last tick, by time, faster than 0.02 m/s. What rests, slides or
         is clamped has none. Raises WrongForm without record_impacts().
         """
-        if self._impact_reader is None:
-            raise errors.WrongForm('impacts', 'not recorded',
-                                   'record_impacts(load_limits()) before the tick')
-        return tuple(self._impacts)
+        return tuple(self._recorded_impacts().impacts)
 
     @property
     def dropped_impacts(self) -> int:
         """Number of impacts since record_impacts() that are in no tick's ``impacts``: there are at
         most eight a bone and tick.
         """
-        return self._dropped_impacts
+        return self._recorded_impacts().dropped
 
     @property
     def bones_on_ground(self) -> np.ndarray:
@@ -419,7 +413,7 @@ class Simulation:
         (10, 3)
         """
         begin, substates = self.time, [self.state]
-        self._impacts = []
+        self._clear_impacts()
         for sample in range(1, self._samples_per_tick + 1):
             end = begin + self.tick * sample // self._samples_per_tick
             if self.asleep and not self._pushes and not self._springs and not (
@@ -575,7 +569,8 @@ class Simulation:
         self._engine = self._make_engine(accuracy)
         self._start = self._engine.save()
         self._engine.restore_checkpoint(engine_checkpoint)
-        self._engine.log_impacts(self._impact_reader is not None)
+        self._engine.log_impacts(self._impact_recorder is not None)
+        self._clear_impacts()
         self._driven.forget_twists()
         self._sleep_detector.restart()
         self.asleep = bool(self._engine.sleeping.all())
@@ -596,6 +591,7 @@ class Simulation:
         self._engine.restore(self._start)
         if not keep_time:
             self.time = 0
+        self._clear_impacts()
         self.substates = (self.state,)
         self._pushes = PushQueue(self.scene)
         self._hands, self._joint_springs = Hands(self.scene), JointSprings(self.scene)
@@ -666,9 +662,8 @@ class Simulation:
         self._engine = self._make_engine(old.accuracy)
         self._start = self._engine.save()
         self._engine.continue_from(old, change)
-        if self._impact_reader is not None:
-            self._engine.log_impacts(True)
-            self._impact_reader = ImpactReader(self.scene, self._impact_reader.limits)
+        if self._impact_recorder is not None:
+            self.record_impacts(self._impact_recorder.limits)
         old.close()
         self._carry_over(change)
         return self.state
@@ -676,7 +671,6 @@ class Simulation:
     def _carry_over(self, change: SceneChange) -> None:
         """Let all that is beside the engine go on in the scene after a change."""
         self.asleep, self.substates = bool(self._engine.sleeping.all()), (self.state,)
-        self._impacts = []
         self._pushes.change_scene(change)
         self._driven.change_scene(change, self.state)
         self._hands.change_scene(change)
@@ -709,17 +703,22 @@ class Simulation:
         if not self.asleep:
             duration = (end - self.time) / SECOND
             self._engine.advance(duration, *loads)
-            if self._impact_reader:
-                self._read_impacts(self._impact_reader)
+            if self._impact_recorder:
+                self._impact_recorder.add(self._engine.impacts, self.time)
             self._hands.move(duration)
         self.time = end
 
-    def _read_impacts(self, reader: ImpactReader) -> None:
-        """Append the impacts of the engine's last advance, which began at ``time``."""
-        found = self._engine.impacts
-        if found is not None:
-            self._impacts += reader.read(found, self.time)
-            self._dropped_impacts += found.dropped
+    def _clear_impacts(self) -> None:
+        """Forget the impacts of the last tick."""
+        if self._impact_recorder:
+            self._impact_recorder.impacts.clear()
+
+    def _recorded_impacts(self) -> ImpactRecorder:
+        """The recorder of impacts. Raises WrongForm: there is none."""
+        if self._impact_recorder is None:
+            raise errors.WrongForm('impacts', 'not recorded',
+                                   'record_impacts(load_limits()) before the tick')
+        return self._impact_recorder
 
     def _put_to_sleep(self) -> None:
         """Put clusters to sleep that have been still for long enough and rest on the ground."""

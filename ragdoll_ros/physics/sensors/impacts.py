@@ -81,22 +81,27 @@ class Impact:
         return half_sine_head_injury(self.peak_acceleration, self.duration, window)
 
 
-class ImpactReader:
+class ImpactRecorder:
     """Makes Impacts of a scene's bones from those that an engine logs."""
 
     def __init__(self, scene: Scene, limits: BiomechanicalLimits) -> None:
-        self._scene, self.limits = scene, limits
+        self._scene, self._limits = scene, limits
         self._regions = [limits.region_of(bone.name) for bone in scene.bones]
+        self.impacts: list[Impact] = []
+        """By time; of two bones that meet that of a comes first."""
+        self.dropped = 0
+        """How many there were no room for in the engine's log."""
 
-    def read(self, found: Impacts, begin: int) -> list[Impact]:
-        """Impacts of an advance that began at ``begin``, ns; of two bones that of a comes first."""
-        made = []
+    def add(self, found: Impacts | None, begin: int) -> None:
+        """Add the impacts of an advance that began at ``begin``, ns."""
+        if found is None:
+            return
+        self.dropped += found.dropped
         for row in range(len(found.a)):
             a, b = int(found.a[row]), int(found.b[row])
-            made.append(self._impact(found, row, begin, a, b, 1.0))
+            self.impacts.append(self._impact(found, row, begin, a, b, 1.0))
             if b >= 0:
-                made.append(self._impact(found, row, begin, b, a, -1.0))
-        return made
+                self.impacts.append(self._impact(found, row, begin, b, a, -1.0))
 
     def _impact(self, found: Impacts, row: int, begin: int, bone: int, other: int,
                 sign: float) -> Impact:
@@ -107,7 +112,7 @@ class ImpactReader:
         return Impact(
             begin + round(found.elapsed[row] * SECOND),
             scene.dolls[scene.doll_of_bone[bone]].name, scene.bone_names[bone],
-            self._regions[bone], self._name(other, int(found.bodies[row])),
+            self._regions[bone], touched_name(scene, other, int(found.bodies[row])),
             _vector(found.positions[row]), _vector(sign * found.normals[row]),
             float(found.speeds[row]), float(found.effective_masses[row]),
             float(found.impulses[row]), float(found.mobilities[row, 0 if sign > 0 else 1]),
@@ -115,13 +120,16 @@ class ImpactReader:
 
     def _region(self, bone: int) -> BodyRegion | None:
         """The region of a bone; None if there is none, or no bone."""
-        return self.limits.regions.get(self._regions[bone]) if bone >= 0 else None
+        return self._limits.regions.get(self._regions[bone]) if bone >= 0 else None
 
-    def _name(self, bone: int, body: int) -> str:
-        """Name of what is met: a bone, a static body or the ground."""
-        if bone >= 0:
-            return self._scene.bone_names[bone]
-        return self._scene.bodies[body].name if body >= 0 else GROUND_NAME
+
+def touched_name(scene: Scene, bone: int, body: int) -> str:
+    """Name of what is touched: a bone, a static body or the ground, whose indices are GROUND for
+    those that it is not.
+    """
+    if bone >= 0:
+        return scene.bone_names[bone]
+    return scene.bodies[body].name if body >= 0 else GROUND_NAME
 
 
 def _vector(row: np.ndarray) -> Vector:
