@@ -69,7 +69,7 @@ def merge_patch(found: np.ndarray, begin: int, end: int) -> None:
     """
     c, total, velocity, point = found[begin], 0.0, 0.0, (0.0, 0.0, 0.0)
     for j in range(begin, end):
-        share = found[j].impulse[0]
+        share = max(0.0, found[j].impulse[0])  # a solver leaves some a rounding below
         total += share
         velocity += share * found[j].normal_velocity
         point = add_scaled(point, share, vec(found[j].point))
