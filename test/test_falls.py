@@ -260,7 +260,8 @@ def test_five_errors_are_all_named():
     ({'record': {'imu_rate': 250}}, 'record.imu_rate'),
     *[({'record': {'imus': [{'name': 'a', 'bone': 'torso', key: value}]}}, f'record.imus[0].{path}')
       for key, value, path in (('noise_rate', -1, 'noise_rate'), ('range', [-1, 0], 'range'),
-                               ('noise_acceleration', float('nan'), 'noise_acceleration'))],
+                               ('noise_acceleration', float('nan'), 'noise_acceleration'),
+                               ('mount_frequency', -1, 'mount_frequency'))],
     ({'seed': -1}, 'seed')])
 def test_what_cannot_be_drawn_is_refused(changes, path):
     _, found = build_recipe({**STAND, **changes}, Path('recipe.yaml'))

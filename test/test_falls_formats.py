@@ -22,6 +22,7 @@ from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import OutOfRange, WrongForm
 from ragdoll_ros.physics.sensors.imu import ImuMount, imu_samples
+from ragdoll_ros.physics.sensors.response import ImuResponse, ResponseFilter
 
 parquet = pytest.importorskip('pyarrow.parquet')
 COUNT = 3
@@ -322,6 +323,22 @@ def test_a_sensors_flaws_are_added_to_what_it_should_read():
     clipped = recipe({**DROP, 'duration': 0.6}, record={
         'imus': [{'name': 'a', 'bone': 'ball', 'range': [5, 0]}]})
     assert fall_samples(next(generate(clipped, [0])), 0)[-1].tolist() == [0, 0, 5, 0, 0, 0]
+
+
+def test_a_sensor_on_soft_tissue_swings_before_its_range_clips():
+    soft = {'mount_frequency': 30, 'mount_damping': 0.2, 'bandwidth': 200}
+    made = recipe({**DROP, 'duration': 0.6}, record={'rate': 100, 'imu_rate': 1000, 'imus': [
+        {'name': 'a', 'bone': 'ball'}, {'name': 'b', 'bone': 'ball', **soft},
+        {'name': 'c', 'bone': 'ball', **soft, 'range': [50, 0]}]})
+    fall = next(generate(made, [0]))
+    rigid, swings, clipped = (fall_samples(fall, imu)[:, :3] for imu in range(3))
+    expected = imu_samples(fall.imu_states[:, 1], ImuMount('ball'), 0.001, fall.scene.gravity,
+                           ResponseFilter(ImuResponse(30.0, 0.2, 200.0)))
+    np.testing.assert_array_equal(swings[1:], expected[:, :3])
+    np.testing.assert_array_equal(clipped, np.clip(swings, -50, 50))
+    assert np.abs(rigid).max() > 3 * np.abs(swings).max() > 150
+    # All that the ball's velocity changes by goes through the mount, by 0.6 s.
+    assert swings.sum() == pytest.approx(rigid.sum(), rel=1e-2)
 
 
 def test_mcap_tells_a_sensors_noise(tmp_path):

@@ -9,6 +9,7 @@ from sensor_msgs.msg import Imu
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.errors import RagdollError
 from ragdoll_ros.physics.sensors.imu import ImuMount, tick_samples
+from ragdoll_ros.physics.sensors.response import ImuResponse, ResponseFilter
 from ragdoll_ros.physics.simulation import Simulation
 
 SCENE = {'scene': 'woman_faints', 'publish_clock': True}
@@ -38,7 +39,20 @@ def heard(node, peer, ticks, bone='head'):
 
 def test_samples_are_those_of_the_library(make_node, peer):
     node = make_node(**SCENE, imus=['head 0.1 0 0.05 0 0 1.5'], imu_rate=1000.0)
-    read, stamps, first = heard(node, peer, 5)
+    rigid = heard(node, peer, 5)
+    node.set_parameters_atomically([
+        Parameter('imu_mount_frequency', value=25.0), Parameter('imu_mount_damping', value=0.2),
+        Parameter('imu_bandwidth', value=100.0)])
+    soft, again = heard(node, peer, 5)[0], heard(node, peer, 5)[0]
+    assert (soft == again).all(), 'a reset starts the mount again'
+    assert np.abs(soft - rigid[0]).max() > 1e-3
+    for (read, stamps, first), response in ((rigid, ImuResponse()),
+                                            ((soft, *rigid[1:]), ImuResponse(25.0, 0.2, 100.0))):
+        check_samples(read, stamps, first, ResponseFilter(response))
+
+
+def check_samples(read, stamps, first, response):
+    """What the library computes of the same five ticks, at 1 kHz."""
     scene = load_scene('woman_faints')
     mount = ImuMount('head', (0.1, 0, 0.05), (0, 0, np.sin(0.75), np.cos(0.75)))
     expected = []
@@ -47,7 +61,7 @@ def test_samples_are_those_of_the_library(make_node, peer):
         for _ in range(5):
             simulation.advance()
             expected.append(tick_samples(simulation.substates, scene.bone_index('head'), mount,
-                                         simulation.step, scene.gravity))
+                                         simulation.step, scene.gravity, response))
     assert np.abs(read - np.concatenate(expected)).max() < 1e-12
     assert stamps == tuple(1_000_000 * number for number in range(1, 51))
     assert first.header.frame_id == 'head_imu'

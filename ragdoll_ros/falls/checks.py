@@ -11,7 +11,7 @@ from ..model.vectors import finite_floats, unit_vector
 from ..people.person import HEIGHTS, MASSES
 from ..physics.simulation import MAX_SAMPLES_PER_TICK
 from .distribution import choices, distribution_errors, support
-from .fall import flaws_of
+from .fall import flaws_of, response_of
 
 RATE = 100
 """Default frames per second."""
@@ -111,7 +111,7 @@ def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """IMUs with equal names, or with an invalid position, orientation or flaw."""
+    """IMUs with equal names, or with an invalid position, orientation, flaw or response."""
     if has_error_under(found, 'record'):
         return
     names = []
@@ -120,6 +120,7 @@ def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
         try:
             checked_mount(mount)
             flaws_of(mount)
+            response_of(mount)
         except ModelError as error:
             yield error.at(where)
         if mount['name'] in names:

@@ -9,6 +9,7 @@ from ..model import rotation
 from ..model.scene import Scene
 from ..people.fall_phases import Phases, bone_impacts
 from ..physics.sensors.imu import ImuErrors, ImuMount, imu_samples, sensor_motion
+from ..physics.sensors.response import ImuResponse, ResponseFilter
 
 SAMPLE_NAMES = ('ax', 'ay', 'az', 'wx', 'wy', 'wz')
 
@@ -86,13 +87,14 @@ class Fall:
 
 
 def fall_samples(fall: Fall, imu: int) -> np.ndarray:
-    """Samples (s, 6) of the recipe's sensor ``imu``, m/s^2 and rad/s in its own axes, with noise,
-    bias and range.
+    """Samples (s, 6) of the recipe's sensor ``imu``, m/s^2 and rad/s in its own axes, with its
+    response, noise, bias and range.
 
     Sample k is the mean over the interval that ends at its stamp; the first repeats the second.
     """
     true = imu_samples(fall.imu_states[:, imu], mount_of(fall, imu),
-                       fall.times[1] / fall.samples_per_frame, fall.scene.gravity)
+                       fall.times[1] / fall.samples_per_frame, fall.scene.gravity,
+                       ResponseFilter(response_of(fall.imus[imu])))
     # Recipe.draw's counter begins with 0, a sensor's with 1 + imu: they are 2^128 draws apart.
     random = np.random.Generator(np.random.Philox(
         key=fall.noise_key, counter=[0, 0, 1 + imu, fall.number]))
@@ -117,8 +119,17 @@ def sensor_orientations(fall: Fall, imu: int) -> np.ndarray:
 
 def flaws_of(sensor: dict) -> ImuErrors:
     """Noise, bias and range of a recipe's sensor; NotFinite, OutOfRange."""
-    return ImuErrors(**{field.name: sensor[field.name] for field in fields(ImuErrors)
-                        if field.name in sensor})
+    return ImuErrors(**_named(ImuErrors, sensor))
+
+
+def response_of(sensor: dict) -> ImuResponse:
+    """Soft mount and low-pass filter of a recipe's sensor; OutOfRange."""
+    return ImuResponse(**_named(ImuResponse, sensor))
+
+
+def _named(kind: type, sensor: dict) -> dict:
+    """What a recipe's sensor has of a dataclass's fields."""
+    return {field.name: sensor[field.name] for field in fields(kind) if field.name in sensor}
 
 
 def mount_of(fall: Fall, imu: int) -> ImuMount:

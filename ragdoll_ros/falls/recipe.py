@@ -71,7 +71,9 @@ class Recipe:
 
     @property
     def imus(self) -> list[dict]:
-        """Inertial sensors: name, bone, position m and orientation on the bone, of ImuErrors."""
+        """Inertial sensors: name, bone, position m and orientation on it, and fields of ImuResponse
+        and ImuErrors.
+        """
         return self.data['record']['imus']
 
     @cached_property

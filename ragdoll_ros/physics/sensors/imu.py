@@ -18,6 +18,7 @@ from ...model.rotation import IDENTITY
 from ...model.state import State
 from ...model.vectors import Quaternion, Vector, finite_floats, unit_vector
 from ..rigid_body import cross
+from .response import ResponseFilter
 
 SMALL = 1e-4
 """rad: below, the second term of the series is less than 1e-9 of the first."""
@@ -74,28 +75,31 @@ def sensor_motion(rows: np.ndarray, mount: ImuMount) -> tuple[np.ndarray, np.nda
             rows[..., 7:10] + cross(rows[..., 10:13], arms))
 
 
-def imu_samples(rows: np.ndarray, mount: ImuMount, step: float,
-                gravity: Sequence[float]) -> np.ndarray:
+def imu_samples(rows: np.ndarray, mount: ImuMount, step: float, gravity: Sequence[float],
+                response: ResponseFilter | None = None) -> np.ndarray:
     """Samples (t, 6) between states of a bone that are ``step`` s apart, rows (t + 1, 13): specific
-    force, m/s^2, and angular rate, rad/s, in the sensor's frame (REP 145).
+    force, m/s^2, and angular rate, rad/s, in the sensor's frame (REP 145). ``response`` has the
+    state of a soft mount and a low-pass filter; the mount acts on the force alone.
 
     The specific force is -gravity at rest and 0 in free fall. Rotations above pi in one sample are
     aliased.
     """
+    response = response or ResponseFilter()
     _, turns, velocities = sensor_motion(rows, mount)
+    velocities = response.mounted(velocities, step, np.asarray(gravity, float))
     turned = rotation.rotation_vector(rotation.multiply(rotation.inverse(turns[:-1]), turns[1:]))
     changed = np.diff(velocities, axis=0) / step - np.asarray(gravity, float)
     force = _from_mean(turned, rotation.rotate(rotation.inverse(turns[:-1]), changed))
-    return np.concatenate([force, turned / step], axis=1)
+    return response.low_pass(np.concatenate([force, turned / step], axis=1), step)
 
 
 def tick_samples(substates: Sequence[State], bone: int, mount: ImuMount, step: float,
-                 gravity: Sequence[float]) -> np.ndarray:
+                 gravity: Sequence[float], response: ResponseFilter | None = None) -> np.ndarray:
     """Samples (t, 6) of the last tick, of ``step`` s, from Simulation.substates and the bone's
     index in the scene.
     """
     rows = np.array([state.rows[bone] for state in substates])
-    return imu_samples(rows, mount, step / max(len(rows) - 1, 1), gravity)
+    return imu_samples(rows, mount, step / max(len(rows) - 1, 1), gravity, response)
 
 
 def _from_mean(turned: np.ndarray, mean: np.ndarray) -> np.ndarray:

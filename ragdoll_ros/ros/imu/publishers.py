@@ -11,6 +11,7 @@ from sensor_msgs.msg import Imu
 
 from ...model.scene import Scene
 from ...physics.sensors.imu import ImuMount, tick_samples
+from ...physics.sensors.response import ImuResponse, ResponseFilter
 from ..messages.convert import to_imu
 from ..messages.serialized import SerializedTemplate
 from .imu_parameters import imu_topic, parse_mount
@@ -30,6 +31,23 @@ class Sensor(NamedTuple):
     mount: ImuMount
     bone: int
     template: SerializedTemplate
+    response: ContinuousResponse
+
+
+class ContinuousResponse:
+    """The filter of a sensor. It restarts at a reset, and after ticks without a subscriber."""
+
+    def __init__(self, response: ImuResponse) -> None:
+        self._response = response
+        self._end: tuple[int, int] | None = None
+
+    def at(self, simulation: Simulation) -> ResponseFilter:
+        """The filter for the samples of the last tick."""
+        run, end = simulation.reset_count, simulation.time
+        if self._end != (run, end - simulation.tick):
+            self._filter = ResponseFilter(self._response)
+        self._end = run, end
+        return self._filter
 
 
 class ImuPublishers:
@@ -58,17 +76,19 @@ class ImuPublishers:
                 Imu, topic, DEPTH)
             make = partial(to_imu, f'{mount.bone}_imu', self._flaws)
             self._sensors[topic] = Sensor(publisher, mount, scene.bone_index(mount.bone),
-                                          SerializedTemplate.trace(make, (3,), (3,)))
+                                          SerializedTemplate.trace(make, (3,), (3,)),
+                                          ContinuousResponse(settings.imu_response))
         for publisher in publishers.values():
             self._node.destroy_publisher(publisher)
 
     def publish(self, simulation: Simulation, stamp: int) -> None:
         """Publish the samples of the last tick, which ends at ``stamp``, ns, where subscribed."""
-        for index, (publisher, mount, bone, template) in enumerate(self._sensors.values()):
+        for index, sensor in enumerate(self._sensors.values()):
+            publisher, mount, bone, template, response = sensor
             if not publisher.get_subscription_count():
                 continue
             exact = tick_samples(simulation.substates, bone, mount, simulation.step,
-                                  simulation.scene.gravity)
+                                 simulation.scene.gravity, response.at(simulation))
             samples = self._flaws(exact, _noise(self._seed, index, simulation.time))
             spacing = simulation.tick / len(samples) / self._stamp_factor
             for number, sample in enumerate(samples, 1 - len(samples)):

@@ -13,6 +13,7 @@ from ...model.scene import STEP_RANGE, Scene
 from ...physics.accuracy import ACCURACIES
 from ...physics.engine.registry import ENGINES, check_engine
 from ...physics.sensors.imu import ImuErrors
+from ...physics.sensors.response import RANGES, ImuResponse
 from ...physics.simulation import MAX_WORKERS
 from ..imu.imu_parameters import check_imus
 from ..messages.tf import PUBLISH_TF
@@ -84,6 +85,14 @@ class NodeSettings:
     imu_rate: float = _parameter(
         100.0, 'Samples of each inertial sensor per second of simulated time, Hz', (1.0, 1000.0),
         constraints='a multiple of rate, where there are imus')
+    imu_mount_frequency: float = _parameter(
+        0.0, 'Natural frequency of each inertial sensor on soft tissue, Hz; 0: rigid on the bone',
+        RANGES['mount_frequency'])
+    imu_mount_damping: float = _parameter(
+        ImuResponse.mount_damping, 'Damping ratio of that mount', RANGES['mount_damping'])
+    imu_bandwidth: float = _parameter(
+        0.0, "-3 dB frequency of each inertial sensor's low-pass filter of order 2, Hz; 0: none",
+        RANGES['bandwidth'])
     imu_noise_acceleration: float = _parameter(
         0.0, "Standard deviation of a sample's specific force, m/s^2", (0.0, 1000.0))
     imu_noise_rate: float = _parameter(
@@ -114,6 +123,11 @@ class NodeSettings:
                          self.imu_range)
         except errors.ModelError as error:
             raise type(error)(f'imu_{error.path}', error.value, error.expected) from None
+
+    @property
+    def imu_response(self) -> ImuResponse:
+        """Soft mount and low-pass filter of each sensor, in the ranges of the descriptors."""
+        return ImuResponse(self.imu_mount_frequency, self.imu_mount_damping, self.imu_bandwidth)
 
 
 SPECS = {field.name: field for field in fields(NodeSettings)}

@@ -5,7 +5,7 @@ Acta Numerica 19, 2010, section 2, for linear spaces; here in the tangent plane 
 exponential map of the sphere):
 
 1. In the tangent plane at d, solve exactly the damped oscillator about a target that moves with
-   the frame, under a force linear in time (oscillator.py).
+   the frame, under a force linear in time (maths/oscillator.py).
 2. Map the result to the sphere and transport the rate in parallel (sphere.py).
 3. Add to the rate the difference between true and model force at the end, as a force that grows
    linearly from zero over the step.
@@ -28,11 +28,11 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..maths.oscillator import oscillator_response
 from ..maths.vectors import (Vec3, add, add_scaled, cross, dot, norm, put, quat_to_matrix, scale,
                              sub, vec)
 from .bone_path import orientation_of
 from .links import Frame
-from .oscillator import oscillator_response
 from .sphere import exp_map, log_map, transported
 
 LARGEST_FORCED_PHASE = 0.5

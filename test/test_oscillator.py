@@ -1,4 +1,4 @@
-"""The damped oscillator of a swing against the exponential of its matrix."""
+"""The damped oscillator against the exponential of its matrix."""
 import itertools
 import math
 
@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 numba = pytest.importorskip('numba')
-from ragdoll_ros.physics.kernels.swing import oscillator  # noqa: E402
+from ragdoll_ros.physics.kernels.maths import oscillator  # noqa: E402
 
 STEP = 0.01
 

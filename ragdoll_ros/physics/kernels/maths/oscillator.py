@@ -3,8 +3,10 @@ from __future__ import annotations
 
 import math
 
-from ..compiling.decorators import compiled
-from ..maths.transcendental import exp_minus, sine_and_cosine
+import numpy as np
+
+from ..compiling.decorators import compiled, entry, type_like
+from .transcendental import exp_minus, sine_and_cosine
 
 TERMS = 24
 """Terms of the series; for arguments up to 1 the remainder is below 1e-24."""
@@ -78,3 +80,19 @@ def _phi2(x: float) -> float:
         term = term * x / k
         series += term
     return series
+
+
+@entry(*[type_like(0.0)] * 3, type_like(np.zeros((0, 0))), *[type_like(np.zeros(0))] * 2,
+       *[type_like(np.zeros((0, 0)))] * 2)
+def drive_oscillators(w: float, c: float, h: float, forces: np.ndarray, z: np.ndarray,
+                      rate: np.ndarray, z_path: np.ndarray, rate_path: np.ndarray) -> None:
+    """Advance ``z`` and z', ``rate`` (k,), of equal oscillators by t steps of ``h`` s in which
+    ``forces`` (t, k) are constant; write those at the end of each to the paths (t, k).
+    """
+    m, n1, _ = oscillator_response(w, c, h)
+    for i in range(len(forces)):
+        for j in range(len(z)):
+            start, f = z[j], forces[i, j]
+            z[j] = (1 - w * n1) * start + m * rate[j] + n1 * f
+            rate[j] = (1 - w * n1 - c * m) * rate[j] + m * (f - w * start)
+            z_path[i, j], rate_path[i, j] = z[j], rate[j]
