@@ -102,7 +102,8 @@ class Simulation:
         if any(placement.angles or placement.rates for placement in scene.dolls):
             self._placed = placed_coordinates(scene.dolls)
         self._engine = self._make_engine(resolve_accuracy(accuracy))
-        if not self._engine.moves_bodies and any(placement.follow for placement in scene.dolls):
+        self._follows = any(placement.follow for placement in scene.dolls)
+        if self._follows and not self._engine.moves_bodies:
             raise errors.WrongForm('engine', self.engine_name, 'rigid, for bodies with follow')
         self._start = self._engine.save()
         self._sleep_detector, self._stability_test = SleepDetector(scene), StabilityTest(scene)
@@ -417,12 +418,12 @@ class Simulation:
         for sample in range(1, self._samples_per_tick + 1):
             end = begin + self.tick * sample // self._samples_per_tick
             if self.asleep and not self._pushes and not self._springs and not (
-                    self._driven.moving_bones(self.time)):
+                    self._follows and self._driven.moving_bones(self.time)):
                 self.time = end
             while self.time < end:
                 change = self._pushes.next_change(self.time) if self._pushes else None
                 until = end if change is None else min(end, change)
-                if self._driven:
+                if self._follows:
                     until = min(until, self._driven.next_change(self.time, end))
                 self._advance_until(until)
             substates.append(self.state)
@@ -513,7 +514,7 @@ class Simulation:
                 'orientation', orientation, 'a quaternion x, y, z, w, not zero', 4)
         self._engine.set_doll(index, here)
         self._driven.hold(index, self.state, self.time)
-        self._sleep_detector.restart(np.arange(len(names)) == index)
+        self._sleep_detector.restart(np.arange(len(self.scene.dolls)) == index)
         self.asleep = False
         if self._swings and self.scene.dolls[index].doll.swings:
             self._swings.reset(self.time, self.state)
@@ -532,7 +533,9 @@ class Simulation:
             WrongForm: the engine is not rigid.
 
         >>> simulation.add(Placement(load_doll('man'), 'man', (0, 2, 1))).positions.shape
-        (27, 3)
+        (26, 3)
+        >>> simulation.remove('man').positions.shape
+        (10, 3)
         """
         dolls = self.scene.dolls
         # Equal dolls share what is computed for them.
@@ -546,9 +549,6 @@ class Simulation:
         Raises:
             UnknownDoll: the scene has no such doll.
             WrongForm: it is the only doll, or the engine is not rigid.
-
-        >>> simulation.remove('man').positions.shape
-        (10, 3)
         """
         index = self._doll_index(doll)
         return self._change_scene(self.scene.dolls[:index] + self.scene.dolls[index + 1:])
@@ -617,7 +617,7 @@ class Simulation:
             'sinking_m': max(0.0, -float(
                 self._heights(self.state)[self._yields].min(initial=np.inf))),
             **({'stale_bodies': len(self.stale_bodies), 'body_jumps_total': self._driven.jumps}
-               if self._driven else {}),
+               if self._follows else {}),
             'asleep': self.asleep}
 
     def ledger(self) -> dict[str, int]:
@@ -659,6 +659,7 @@ class Simulation:
             self._placed = changed_coordinates(
                 self._placed or placed_coordinates(self.scene.dolls), change)
         self.scene, self._overlaps = change.after, None
+        self._follows = any(placement.follow for placement in dolls)
         self._engine = self._make_engine(old.accuracy)
         self._start = self._engine.save()
         self._engine.continue_from(old, change)
@@ -689,7 +690,7 @@ class Simulation:
     def _advance_until(self, end: int) -> None:
         """Integrate until ``end``, ns; no push begins or ends before."""
         loads: tuple[Wrenches, Springs, Drives] = (), self._springs, ()
-        if self._driven:
+        if self._follows:
             for doll, velocity, spin in self._driven.twists(self.time, end):
                 self._engine.set_twist(doll, velocity, spin)
             loads = (), loads[1], self._driven.drives(self.time, self.state,
@@ -726,7 +727,7 @@ class Simulation:
         if self.asleep or not self.accuracy.sleep or detector.all_move(self._engine):
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs),
-                  *self._driven.moving_bones(self.time))
+                  *(self._driven.moving_bones(self.time) if self._follows else ()))
         dolls = detector.find_ready(self._engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs
             return

@@ -7,8 +7,8 @@ shows; ``tick`` is the number of ticks made before it; the other fields depend o
   first state as ``state``
 - reset: the simulation is back at its start; the same fields without the state, and ``keep_time``
   if simulated time continues
-- push, drive, release, grab, drag, let_go, drive_body, set_state, remove, step, accuracy, go_back: a
-  call of the simulation (physics/logged_simulation.py) with its arguments
+- push, drive, release, grab, drag, let_go, drive_body, set_state, remove, step, accuracy, go_back:
+  a call of the simulation (physics/logged_simulation.py) with its arguments
 - add: likewise; ``placement`` is YAML, as a scene of the doll alone
 - state: ``sha256`` of the state, every HASH_INTERVAL ticks, while there is a subscriber
 - pause, parameters: for information; their effects on the simulation are events of their own

@@ -177,9 +177,6 @@ class DrivenBodies:
         self._exact = [body for body in bodies.values() if body.placement.is_kinematic]
         self._limited = [body for body in bodies.values() if not body.placement.is_kinematic]
 
-    def __len__(self) -> int:
-        return len(self._bodies)
-
     def change_scene(self, change: SceneChange, state: State) -> None:
         """Let the bodies that stay go on as they move, and those that come stand."""
         bodies = DrivenBodies(change.after, state)._bodies

@@ -297,8 +297,10 @@ class RigidEngine:
         """
         clusters = self._clusters
         pairs = self._pairs_to_form(duration) if len(self.scene.dolls) > 1 else None
-        found_others = clusters.static_geoms.update(clusters.bone_states, duration,
-                                                     ~(self.sleeping | self._kinematic))
+        moving = ~self.sleeping
+        if self._some_kinematic:
+            moving &= ~self._kinematic
+        found_others = clusters.static_geoms.update(clusters.bone_states, duration, moving)
         if pairs is not None:
             clusters.form(pairs)
         elif found_others:
