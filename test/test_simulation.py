@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 
+from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.coordinates import GeneralizedState
@@ -224,7 +225,8 @@ def test_an_unknown_engine_is_named():
 
 def test_examples_of_the_docstrings_run():
     with Simulation(DROP) as simulation:
-        result = doctest.testmod(module, extraglobs={'simulation': simulation, 'Push': Push})
+        result = doctest.testmod(module, extraglobs={
+            'simulation': simulation, 'Push': Push, 'load_doll': load_doll})
     assert result.attempted > 10 and not result.failed
 
 

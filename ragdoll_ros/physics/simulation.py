@@ -664,7 +664,9 @@ class Simulation:
         self._start = self._engine.save()
         self._engine.continue_from(old, change)
         if self._impact_recorder is not None:
+            dropped = self._impact_recorder.dropped
             self.record_impacts(self._impact_recorder.limits)
+            self._impact_recorder.dropped = dropped
         old.close()
         self._carry_over(change)
         return self.state

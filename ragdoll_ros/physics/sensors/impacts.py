@@ -85,7 +85,7 @@ class ImpactRecorder:
     """Makes Impacts of a scene's bones from those that an engine logs."""
 
     def __init__(self, scene: Scene, limits: BiomechanicalLimits) -> None:
-        self._scene, self._limits = scene, limits
+        self._scene, self.limits = scene, limits
         self._regions = [limits.region_of(bone.name) for bone in scene.bones]
         self.impacts: list[Impact] = []
         """By time; of two bones that meet that of a comes first."""
@@ -120,7 +120,7 @@ class ImpactRecorder:
 
     def _region(self, bone: int) -> BodyRegion | None:
         """The region of a bone; None if there is none, or no bone."""
-        return self._limits.regions.get(self._regions[bone]) if bone >= 0 else None
+        return self.limits.regions.get(self._regions[bone]) if bone >= 0 else None
 
 
 def touched_name(scene: Scene, bone: int, body: int) -> str:
