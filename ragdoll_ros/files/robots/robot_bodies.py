@@ -18,6 +18,7 @@ from ...model.scene import LIMIT_TOLERANCE
 from ...model.shapes import Part, Shape
 from ...model.static_body import StaticBody
 from ...model.vectors import Quaternion, Vector, floats
+from ..config import config_folder
 from ..doll import plain_name
 from .mesh_file import bounding_box, find_file, read_mesh
 from .sdf_tree import parse_sdf
@@ -64,7 +65,7 @@ class PlacedRobot:
 def read_robot(entry: dict, folder: Path) -> tuple[PlacedRobot | None, list[ModelError]]:
     """The robot of an entry of a scene in ``folder``; else None and every error."""
     key, = PARSERS.keys() & entry.keys()
-    path = find_file(entry[key], folder)
+    path = find_file(entry[key], folder) or find_file(entry[key], config_folder())
     if path is None:
         return None, [errors.Unreadable(key, entry[key], f'a {key.upper()} file: a path from the '
                                         'scene, or package://PACKAGE/PATH')]
