@@ -816,6 +816,29 @@ def test_an_uploaded_doll_opens_no_other_files(desk, tmp_path_factory, model, pl
     assert desk.editor.scene.dolls[0].doll.model == str(desk.path / 'here.glb')
 
 
+@pytest.mark.parametrize('path', ['{}/r.urdf', 'file://{}/r.urdf', '../{name}/r.urdf', 'r.urdf',
+                                  'package://{name}/r.urdf', 'link.urdf', '/dev/zero'])
+def test_an_uploaded_scene_opens_no_other_robots(desk, tmp_path_factory, path):
+    """One that lies here, and the shipped one, may be named."""
+    urdf = ('<robot name="r"><link name="{}"><collision><geometry><sphere radius="1"/></geometry>'
+            '</collision></link></robot>')
+    away = tmp_path_factory.mktemp('away')
+    (away / 'r.urdf').write_text(urdf.format('secret'))
+    (desk.path.parent / 'r.urdf').write_text(urdf.format('secret'))
+    (desk.path / 'link.urdf').symlink_to(away / 'r.urdf')
+    (desk.path / 'here.urdf').write_text(urdf.format('open'))
+
+    def upload(path):
+        desk.files.upload('x.yaml', yaml.safe_dump({'dolls': [{'doll': 'doll'}], 'bodies': [
+            {'name': 'a', 'urdf': path}]}).encode())
+        return [body.name for body in desk.editor.scene.bodies]
+
+    assert upload(path.format(away, name=away.name)) == []
+    assert 'bodies[0].urdf' in desk.said() and f'inside {desk.path}' in desk.said()
+    assert upload('here.urdf') == ['a_open']
+    assert 'a_pedestal' in upload('robot.urdf')
+
+
 BOMB = b'a: &a [x, x]\n' + b''.join(
     b'%c: &%c [*%c, *%c, *%c, *%c, *%c, *%c]\n' % (k + 1, k + 1, k, k, k, k, k, k)
     for k in range(97, 110)) + b'bones: [*n]\n'

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...files import yaml_text
-from ...files.config import scene_names
+from ...files.config import config_folder, scene_names
+from ...files.robots.robot_bodies import PARSERS
 from ...files.scene import load_scene, save_scene, scene_from_data, scene_text
 from ...model import errors
 from ...model.scene import Placement, Scene, all_above_ground
@@ -85,6 +86,7 @@ class SceneFolder:
             data = yaml_text.parse(content)
             self._check_dolls(data)
             self._check_models(data)
+            self._check_robots(data)
             return scene_from_data(data, self.path / name)
         except errors.ModelError as error:
             raise errors.ModelErrors(name, [error]) from None
@@ -135,14 +137,22 @@ class SceneFolder:
         """Raise Unreadable for characters that are not here."""
         for place, doll in [('', data), *_dolls_of(data)]:
             model = doll.get('model') if isinstance(doll, dict) else None
-            if not isinstance(model, str):
-                continue
-            try:
-                inside = (self.path / model).resolve().is_relative_to(self.path)
-            except (ValueError, OSError, RuntimeError):
-                inside = False
-            if not inside:
+            if isinstance(model, str) and not self._is_inside(model):
                 raise errors.Unreadable('model', model, f'a file inside {self.path}').at(place)
+
+    def _check_robots(self, data: object) -> None:
+        """Raise Unreadable for robots and worlds that are neither here nor in config/."""
+        for place, source in _robots_of(data):
+            is_shipped = source in {path.name for path in config_folder().iterdir()}
+            if not is_shipped and not (self._is_inside(source) and (self.path / source).is_file()):
+                raise errors.Unreadable(place, source, f'a file inside {self.path}')
+
+    def _is_inside(self, name: str) -> bool:
+        """Whether a path from this folder leads to a file of it."""
+        try:
+            return (self.path / name).resolve().is_relative_to(self.path)
+        except (ValueError, OSError, RuntimeError):
+            return False
 
     def _keep(self, name: str, content: bytes) -> Path:
         """Save a character, with a number in its name if another file has that name."""
@@ -165,6 +175,15 @@ def _dolls_of(data: object) -> Iterator[tuple[str, object]]:
     for index, entry in enumerate(dolls if isinstance(dolls, list) else ()):
         if isinstance(entry, dict):
             yield f'dolls[{index}].doll', entry.get('doll')
+
+
+def _robots_of(data: object) -> Iterator[tuple[str, str]]:
+    """Path and value of each file of a robot in parsed data that may be a scene."""
+    bodies = data.get('bodies') if isinstance(data, dict) else None
+    for index, entry in enumerate(bodies if isinstance(bodies, list) else ()):
+        for key in PARSERS.keys() & entry.keys() if isinstance(entry, dict) else ():
+            if isinstance(entry[key], str):
+                yield f'bodies[{index}].{key}', entry[key]
 
 
 def safe_name(name: str) -> str:
