@@ -1,6 +1,7 @@
 """Impacts in figures against closed forms, an integrated spring, and MuJoCo's mass matrix."""
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -11,6 +12,7 @@ from loose_bodies import WEIGHTLESS, ball, box
 from ragdoll_ros import (
     Bone,
     Box,
+    Follow,
     Ground,
     Joint,
     Placement,
@@ -275,6 +277,25 @@ def test_impacts_of_many_have_their_own_times(count):
         assert hit.time * 1e-9 == pytest.approx(math.sqrt(2 * height / 9.8), abs=1e-5)
 
 
+def test_a_driven_body_bumps_with_infinite_mass():
+    """At 1.5 m/s into a ball of 3 kg: mu is 3 kg. While it goes on pushing, there are no more."""
+    robot = dataclasses.replace(Placement(box((0.2,) * 3, 1.0, 'robot'), 'robot', (-0.3, 0, 0)),
+                                follow=Follow())
+    scene = Scene('bump', (robot, Placement(ball(mass=3.0), 'person')), None, DEAD,
+                  gravity=WEIGHTLESS)
+    found = []
+    with Simulation(scene) as simulation:
+        simulation.record_impacts(HARD)
+        for _ in range(30):
+            simulation.drive_body('robot', twist=(1.5, 0, 0, 0, 0, 0))
+            simulation.advance()
+            found += [hit for hit in simulation.impacts if hit.doll == 'person']
+    hit, = found
+    assert hit.against == 'robot/robot'
+    assert (hit.speed, hit.effective_mass, hit.impulse) == pytest.approx((1.5, 3, 4.5), rel=1e-6)
+    assert hit.peak_acceleration == pytest.approx(1.5 * math.sqrt(STIFFNESS / 3), rel=1e-6)
+
+
 def test_what_rests_slides_or_is_pressed_has_no_impacts():
     """A box that slides under a load, which lies from the start."""
     scene = Scene('slide', (Placement(box((0.2,) * 3, 2.0, 'bar'), 'bar', (0, 0, 0.1),
@@ -314,6 +335,24 @@ def test_impacts_are_recorded_on_after_a_reset_and_after_going_back():
                     break
             counts.append([hit.time for hit in found])
         assert len(counts[0]) == 1 and counts[0] == counts[1] == counts[2]
+
+
+def test_impacts_are_recorded_on_where_dolls_come_and_go():
+    """A second ball comes, and its impact has its own name; then the first one goes."""
+    scene = Scene('drop', (Placement(ball(mass=1.0), 'first', (0, 0, 0.2)),), Ground(), DEAD)
+    with Simulation(scene) as simulation:
+        simulation.record_impacts(HARD)
+        simulation.advance()
+        simulation.add(Placement(ball(mass=2.0), 'second', (0.25, 0, 0.2)))
+        found = []
+        for tick in range(30):
+            if tick == 20:
+                simulation.remove('first')
+                simulation.set_state('second', position=(0, 0, 0.2))
+            simulation.advance()
+            found += [(hit.doll, hit.bone, round(hit.effective_mass, 6))
+                      for hit in simulation.impacts]
+    assert found == [('first', 'first/ball', 1.0), ('second', 'second/ball', 2.0)]
 
 
 def test_the_criterion_of_a_blow_on_a_head():

@@ -347,7 +347,7 @@ class Clusters:
             if count:
                 log = log[:count]
                 pairs = bone_pairs(log, cluster.bones[cluster.system.tree['bone']],
-                                   np.zeros(len(log), np.int64), self._static_bodies(cluster, log))
+                                   np.zeros(len(log), np.int64), self._touched_bodies(cluster, log))
                 self._logged.append(logged_impacts(log, pairs, since, count - len(log)))
 
     def save(self) -> object:

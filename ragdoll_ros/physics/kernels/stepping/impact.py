@@ -92,6 +92,6 @@ def impact(s: System, ws: Workspace, cluster: ClusterState, time: float) -> int:
     count_contact_impulses(s, ws, m, cluster.contact_impulses)
     account_kinematic_work(s, ws, kin, q, m)
     ws.stats[0].impacts += 1
-    if len(cluster.impact_log):
+    if len(cluster.impact_log) and not ws.stats[0].twist_changed:
         log_impacts(s, ws, cluster, m, False, SLOW, time)
     return touching - m
