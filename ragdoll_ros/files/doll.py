@@ -8,6 +8,7 @@ from typing import Any
 from ..model import ragdoll
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange
+from ..model.passive import Passive, PassiveEnd
 from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Part, Shape
@@ -180,13 +181,30 @@ def _joint(data: dict) -> Joint:
     fields = dict(data)
     pairs = fields.pop('limits_deg', ())
     limits = tuple(pair and tuple(math.radians(angle) for angle in pair) for pair in pairs)
+    passive = tuple(entry and _passive(entry, f'passive[{index}]')
+                    for index, entry in enumerate(fields.pop('passive', ())))
     try:
-        return Joint(limits=limits, **fields)
+        return Joint(limits=limits, passive=passive, **fields)
     except ModelError as error:
         if not error.path.startswith('limits'):
             raise
         path = error.path.replace('limits', 'limits_deg', 1)
         raise type(error)(path, pairs, error.expected) from None
+
+
+def _passive(data: dict, path: str) -> Passive:
+    def end(key: str) -> PassiveEnd:
+        given = data[key]
+        return _at(f'{path}.{key}', PassiveEnd, {
+            'torque': given['torque'],
+            **{name: math.radians(given[f'{name}_deg']) for name in ('angle', 'width')}})
+    return Passive(end('lower'), end('upper'))
+
+
+def _passive_data(passive: Passive) -> dict:
+    return {key: {'torque': end.torque, 'angle_deg': round(math.degrees(end.angle), 9),
+                  'width_deg': round(math.degrees(end.width), 9)}
+            for key, end in (('lower', passive.lower), ('upper', passive.upper))}
 
 
 def _shape_data(shape: Shape) -> dict:
@@ -232,6 +250,8 @@ def _joint_data(joint: Joint) -> dict:
         data['damping'] = joint.damping
     if joint.names:
         data['names'] = list(joint.names)
+    if joint.passive:
+        data['passive'] = [passive and _passive_data(passive) for passive in joint.passive]
     return data
 
 

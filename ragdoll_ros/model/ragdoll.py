@@ -19,6 +19,7 @@ import numpy as np
 from . import errors, rotation
 from .compound import Compound
 from .errors import set_fields
+from .passive import Passive
 from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Shape
@@ -137,6 +138,8 @@ class Joint:
             files in degrees read back to the same bits.
         damping: N m s/rad on each axis.
         names: of the angles; default the child's, with a suffix where there are several.
+        passive: elastic torque on each angle, None for none; the engine rigid has them. A ball
+            joint without limits has no angles, and so none.
 
     Raises:
         WrongAxes, LimitsReversed, OutOfRange, WrongForm, NotUnit, NotFinite: for its fields.
@@ -154,6 +157,7 @@ class Joint:
     limits: tuple[Limits | None, ...] = ()
     damping: float = 0.0
     names: tuple[str, ...] = ()
+    passive: tuple[Passive | None, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in JOINT_KINDS:
@@ -164,7 +168,7 @@ class Joint:
         set_fields(self, anchor=finite_floats('anchor', self.anchor), damping=float(self.damping),
                    axes=tuple(unit_vector('axes', axis) for axis in self.axes),
                    limits=tuple(map(_rounded_limits, self.limits or (None,) * kind.limits)),
-                   names=tuple(self.names))
+                   names=tuple(self.names), passive=tuple(self.passive))
         if len(self.axes) != kind.axes:
             raise errors.WrongAxes('axes', self.axes, f'{kind.axes} for a {self.kind} joint')
         if len(self.limits) != kind.limits:
@@ -173,6 +177,9 @@ class Joint:
             raise errors.OutOfRange('damping', self.damping, 'zero or above, finite')
         if self.names and len(self.names) != kind.dof:
             raise errors.WrongForm('names', list(self.names), f'{kind.dof} for a {self.kind} joint')
+        if self.passive and len(self.passive) != (0 if self.is_free_ball else kind.dof):
+            raise errors.WrongForm('passive', f'{len(self.passive)} torques',
+                                   f'one for each angle of a {self.kind} joint')
         self._check_limits()
         if len(self.axes) == 2 and abs(np.dot(*self.axes)) > 1e-6:
             raise errors.WrongAxes('axes', self.axes, 'two perpendicular axes')

@@ -25,7 +25,7 @@ from .actions.grab import DRAG_TIME, Grab, Hands, checked_point
 from .actions.joint_springs import JointSpring, JointSprings
 from .actions.push_queue import PushQueue
 from .engine.protocol import Contacts, Drives, Engine, Overlap, Springs, Wrenches
-from .engine.registry import resolve_engine
+from .engine.registry import EngineChoice, resolve_engine
 from .rigid_body import GroundHeights, JointGap
 from .sensors.impacts import Impact, ImpactRecorder
 from .sleeping import SleepDetector
@@ -64,6 +64,7 @@ class Simulation:
     Raises:
         OutOfRange: step, accuracy, engine or workers is not valid.
         MissingEngine: the engine's library is not installed or does not work.
+        WrongForm: a joint has passive torques, and the engine is not rigid.
 
     Example:
         >>> from ragdoll_ros import Push, Simulation, load_scene
@@ -93,6 +94,7 @@ class Simulation:
         self.reset_count = 0
         """Number of starts: the first, and one for each reset() and place()."""
         choice = resolve_engine(engine)
+        _check_passive(scene, choice)
         self.engine_name, self.engine_reason = choice.name, choice.reason
         """Name of the engine, and why 'auto' did not select rigid."""
         self._make = partial(choice.make, workers=int(workers))
@@ -774,6 +776,14 @@ class Simulation:
     def _springs(self) -> Springs:
         """Springs of hands and of joint angles."""
         return self._hands.springs + self._joint_springs.springs
+
+
+def _check_passive(scene: Scene, choice: EngineChoice) -> None:
+    """Raise WrongForm for passive torques with an engine that would leave them out."""
+    has_passive = any(any(joint.passive) for placement in scene.dolls
+                      for joint in placement.doll.joints)
+    if has_passive and not choice.make.supports_joint_springs:
+        raise errors.WrongForm('engine', choice.name, 'rigid, which has passive joint torques')
 
 
 def _swings(scene: Scene) -> SwingSimulation | None:

@@ -83,6 +83,12 @@ def _enter_joint(body: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, in
     body['parent_to_joint'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
     body['joint_to_com'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
     body['joint_axes'][:joint.dof] = joint_axes(joint)
+    for axis, passive in enumerate(joint.passive):
+        for index, end in enumerate((passive.lower, passive.upper) if passive else ()):
+            body['has_passive'] = 1
+            body['passive_torques'][axis, index] = end.torque
+            body['passive_angles'][axis, index] = end.angle
+            body['passive_rates'][axis, index] = 1 / end.width
 
 
 def _energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) -> np.ndarray:

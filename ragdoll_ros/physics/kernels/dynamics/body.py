@@ -8,7 +8,9 @@ BODY = np.dtype([
     ('dof_count', np.int64), ('q_start', np.int64), ('v_start', np.int64), ('mass', float),
     ('inertia', float, 3), ('inertial_orientation', float, 4), ('parent_to_joint', float, 3),
     ('joint_to_com', float, 3), ('joint_axes', float, (3, 3)), ('joint_damping', float),
-    ('kinematic', np.int64)], align=True)
+    ('kinematic', np.int64), ('has_passive', np.int64), ('passive_torques', float, (3, 2)),
+    ('passive_angles', float, (3, 2)), ('passive_rates', float, (3, 2))],
+    align=True)
 """A body and the joint to its parent.
 
 bone: index in the scene. parent: record of the parent, -1 for a root. has_quaternion: 1 if q holds
@@ -18,7 +20,9 @@ inertia: principal moments about the center of mass, kg m^2; inertial_orientatio
 relative to the doll's axes (x, y, z, w). parent_to_joint, joint_to_com: from the parent's center of
 mass to the joint and on to the body's own, m; joint_axes: rows; all three along the doll's axes in
 the bind pose. joint_damping: N m s/rad. kinematic: 1 if it is a doll by itself that moves at
-constant velocity, whatever acts on it, as of infinite inertia (a kinematic body in Box2D)."""
+constant velocity, whatever acts on it, as of infinite inertia (a kinematic body in Box2D).
+has_passive: whether the joint has passive torques; of each axis at the lower and the upper end
+passive_torques, N m, at passive_angles, rad, and passive_rates, 1/rad, 0 for none."""
 
 WORLD = -1
 """In place of the index of a body: what never moves, the ground and static geoms."""

@@ -16,6 +16,7 @@ from ..maths.vectors import (add, add_scaled, cross, quat, quat_mul, quat_rotate
 from .kinematics import (Kinematics, forward_kinematics, inertial_frame, linear, point_of_body,
                          put_spatial, root_orientation)
 from .loads import load_in_world
+from .passive import passive_torque
 
 COMPOSITE_INERTIA = np.dtype([('mass', float), ('moment', float, 3), ('inertia', float, 6)],
                              align=True)
@@ -41,15 +42,15 @@ def make_dynamics(bodies: int, dofs: int) -> Dynamics:
 @compiled
 def forward_dynamics(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
                      v: np.ndarray, kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
-    """Write to ``out`` dv/dt (nv,) at q and v under gravity (3,) m/s^2, loads and joint damping.
-    ``kin`` becomes that of q and v.
+    """Write to ``out`` dv/dt (nv,) at q and v under gravity (3,) m/s^2, loads, joint damping
+    and passive torques. ``kin`` becomes that of q and v.
     """
     forward_kinematics(tree, q, v, kin)
     for i in range(len(tree)):
         begin_articulated_body(tree[i], i, kin, loads, dyn)
     for i in range(len(tree) - 1, -1, -1):
         if tree[i].parent >= 0:
-            aba_backward(tree[i], i, v, kin, dyn)
+            aba_backward(tree[i], i, q, v, kin, dyn)
     for i in range(len(tree)):
         body, bias, velocity = tree[i], dyn.bias_forces[i], kin.spatial_velocities[i]
         if body.kinematic:
@@ -115,7 +116,8 @@ def subtract_load(body: np.record, i: int, kin: Kinematics, load: np.record,
 
 
 @inlined
-def aba_backward(body: np.record, i: int, v: np.ndarray, kin: Kinematics, dyn: Dynamics) -> None:
+def aba_backward(body: np.record, i: int, q: np.ndarray, v: np.ndarray, kin: Kinematics,
+                 dyn: Dynamics) -> None:
     """Second pass, after all children of body i: write U, D_inverse, u and bias accelerations of
     its joint, and add the articulated inertia and bias force that it transmits to the parent's.
     """
@@ -132,6 +134,8 @@ def aba_backward(body: np.record, i: int, v: np.ndarray, kin: Kinematics, dyn: D
             w, u = sub(w, s), sub(u, t)
         put_spatial(drift, cross(w, s), add(cross(u, s), cross(w, t)))
         own, force = 0.0, -body.joint_damping * rate
+        if body.has_passive:
+            force += passive_torque(body, d, q[body.q_start + d])[0]
         for j in range(6):
             value = 0.0
             for k in range(6):

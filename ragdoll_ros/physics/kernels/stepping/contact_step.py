@@ -22,6 +22,7 @@ from ..dynamics.bias_forces import bias_forces
 from ..dynamics.kinematics import (forward_kinematics, integrate_positions, place_geoms,
                                    root_motion_subspaces, rotate_inertias, update_velocities)
 from ..dynamics.mass_matrix import factor_ltl, mass_matrix, solve_lower, solve_upper
+from ..dynamics.passive import passive_torque
 from ..impulses.solve_contacts import solve_contacts
 from ..impulses.solver import UNSOLVED
 from ..system import NO_SLIP, System
@@ -170,6 +171,7 @@ def unconstrained_velocity(s: System, ws: Workspace, cluster: ClusterState, h: f
             bias_forces(s.tree, s.gravity, cluster.loads, middle if stage else v, kin, dyn, change)
             for k in range(len(springs)):
                 add_spring_force(s, kin, step.q_middle, v, springs[k], time, change)
+            add_passive_torques(s.tree, step.q_middle, change)
             for j in range(len(v)):
                 change[j] = h * (change[j] - s.dof_damping[j] * v[j])
             solve_upper(dyn.H, s.dof_parent, change)
@@ -183,15 +185,29 @@ def unconstrained_velocity(s: System, ws: Workspace, cluster: ClusterState, h: f
 @compiled
 def implicit_mass_matrix(s: System, ws: Workspace, springs: np.ndarray, h: float) -> None:
     """Write to dynamics.H the factor of the mass matrix at step.middle with the implicit terms of
-    joint damping and springs in a step of h s.
+    joint damping, passive torques and springs in a step of h s.
     """
     dyn, kin = ws.step.dynamics, ws.step.middle
     mass_matrix(s.tree, s.dof_parent, s.dof_body, kin, dyn)
     for j in range(len(s.dof_damping)):
         dyn.H[j, j] += h * theta_weight(h * s.dof_damping[j] / dyn.H[j, j]) * s.dof_damping[j]
+    for i in range(len(s.tree)):
+        body = s.tree[i]
+        for d in range(body.dof_count if body.has_passive else 0):
+            stiffness = passive_torque(body, d, ws.step.q_middle[body.q_start + d])[1]
+            dyn.H[body.v_start + d, body.v_start + d] += h * stiffness * h / 4
     for k in range(len(springs)):
         add_implicit_stiffness(s, kin, dyn.H, springs[k], h)
     factor_ltl(dyn.H, s.dof_parent)
+
+
+@compiled
+def add_passive_torques(tree: np.ndarray, q: np.ndarray, out: np.ndarray) -> None:
+    """Add the passive torques of all joints at q to ``out`` (nv,)."""
+    for i in range(len(tree)):
+        body = tree[i]
+        for d in range(body.dof_count if body.has_passive else 0):
+            out[body.v_start + d] += passive_torque(body, d, q[body.q_start + d])[0]
 
 
 @compiled

@@ -16,6 +16,7 @@ from ..compiling.decorators import compiled
 from ..contact_kind import LIMIT, ROLLING
 from ..dynamics.kinematics import (Kinematics, inertia_times, root_orientation, root_position,
                                    rotate_inertias, velocity_at)
+from ..dynamics.passive import passive_torque
 from ..maths.cholesky import solve
 from ..maths.vectors import (Vec3, add, add_scaled, cross, divide, dot, put, quat_rotate_inverse,
                              scale, sub, vec)
@@ -51,8 +52,11 @@ def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.
         doll = out[d]
         doll.energy = doll.kinetic - s.doll_masses[d] * dot(vec(doll.center), vec(s.gravity))
     for i in range(len(s.tree)):
-        if s.tree[i].kinematic:
+        body = s.tree[i]
+        if body.kinematic:
             out[s.body_doll[i]].energy = out[s.body_doll[i]].kinetic = 0.0
+        for k in range(body.dof_count if body.has_passive else 0):
+            out[s.body_doll[i]].energy += passive_torque(body, k, q[body.q_start + k])[2]
 
 
 @compiled
