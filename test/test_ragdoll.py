@@ -1,14 +1,19 @@
 """What a doll may be, and the named error for all that it may not be."""
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 from specimens import HANDLE, HEAD, SPECIMENS
 
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.files.urdf import scene_to_urdf
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, joint_axes
+from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
+from ragdoll_ros.model.swing import Swing, strand
 
 BALL = Sphere(0.1)
 
@@ -127,3 +132,15 @@ def test_a_ball_with_two_axes_has_three_ranges_of_its_own():
                         (((0, 0, 1), (0, 1, 0)), ())):
         with pytest.raises(errors.ModelError):
             Joint('a', 'b', 'ball', (0, 0, 0), axes, wrong)
+
+
+def test_what_hangs_on_bones_is_renamed_with_them():
+    """So that a character, and a doll with hair, stand in a scene of several dolls."""
+    tail = Swing('tail', 'head', (0, 0, 1.6), (-1, 0, 0), strand(2, 0.3))
+    doll = dataclasses.replace(load_doll('doll'), swings=(tail,))
+    for each in (load_doll('character'), doll):
+        renamed = each.renamed('a_'.__add__)
+        for before, after in zip((*each.riders, *each.swings),
+                                 (*renamed.riders, *renamed.swings), strict=True):
+            assert after == dataclasses.replace(before, bone=f'a_{before.bone}')
+        scene_to_urdf(Scene('two', (Placement(each, 'a'), Placement(each, 'b'))))

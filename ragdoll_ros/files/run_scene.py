@@ -1,6 +1,7 @@
 """The scene of a run as YAML, with the versions of the libraries that computed it: ~/scene. A doll
 that comes later in the same form.
 """
+import functools
 import hashlib
 import platform
 import re
@@ -18,6 +19,7 @@ LIBRARIES = ('ragdoll_ros', 'numpy', 'numba', 'pybullet', 'mujoco')
 _VERSIONS = re.compile(r'^# versions: (.*)$', re.MULTILINE)
 
 
+@functools.cache
 def versions() -> str:
     """Versions of the installed LIBRARIES, of Python, and the machine, as text."""
     words = []

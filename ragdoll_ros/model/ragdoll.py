@@ -382,7 +382,10 @@ class Ragdoll:
         joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
                                            child=rename(joint.child)) for joint in self.joints)
         pairs = tuple((rename(first), rename(second)) for first, second in self.no_collision)
-        return dataclasses.replace(self, bones=bones, joints=joints, no_collision=pairs)
+        swings, riders = (tuple(dataclasses.replace(each, bone=rename(each.bone)) for each in those)
+                          for those in (self.swings, self.riders))
+        return dataclasses.replace(self, bones=bones, joints=joints, no_collision=pairs,
+                                   swings=swings, riders=riders)
 
 
 def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.ModelError]:

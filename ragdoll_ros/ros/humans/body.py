@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 from dataclasses import dataclass
 
@@ -59,8 +60,8 @@ def _id(name: str, taken: set[str]) -> str:
     """The doll's name as part of a topic's name: letters, digits and underscores."""
     plain = re.sub('[^A-Za-z0-9_]', '_', name)
     plain = plain if plain[:1].isalpha() else f'b{plain}'
-    return next(each for each in (plain, *(f'{plain}_{count}' for count in range(2, 10 ** 6)))
-                if each not in taken)
+    numbered = (f'{plain}_{count}' for count in itertools.count(2))
+    return next(each for each in itertools.chain([plain], numbered) if each not in taken)
 
 
 def _mid_hips(doll: Ragdoll) -> Pose:

@@ -51,7 +51,8 @@ class Humans:
 
     def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
         """Publish the URDFs of a scene's persons; ``frame`` names the world frame."""
-        self._frame, found = frame, bodies(scene, MAX_BODIES)
+        # One is enough to say that it is not published.
+        self._frame, found = frame, bodies(scene, 1 if IdsList is None else MAX_BODIES)
         self._destroy()
         self.status = ', '.join(body.id for body in found)
         if found and IdsList is None:
