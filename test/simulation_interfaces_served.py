@@ -18,6 +18,7 @@ from conftest import ROOT
 from geometry_msgs.msg import PoseArray, Vector3
 from peer import start
 from rclpy.action import ActionClient
+from rclpy.parameter import Parameter
 from simulation_interfaces import action, msg, srv
 from std_srvs.srv import SetBool, Trigger
 
@@ -28,6 +29,7 @@ from ragdoll_ros.ros.simulation_interfaces import (
     entities,
     filters,
     run_state,
+    spawning,
     worlds,
 )
 from ragdoll_ros.ros.simulation_interfaces.servers import snake_case
@@ -45,7 +47,7 @@ def node(make_node, peer):
 @pytest.fixture
 def call(node, peer):
     """Call a service of the node; fields may be nested mappings."""
-    def called(name, **fields):
+    def called(name, /, **fields):
         kind = getattr(srv, name)
         request = kind.Request()
         fill(request, fields)
@@ -91,6 +93,13 @@ def resource(uri, text=''):
     return {'world_resource': fields} if is_new else fields
 
 
+def spawned(uri, text=''):
+    """Fields of a SpawnEntity, by the version."""
+    fields = {'uri': uri, 'resource_string': text}
+    is_new = 'entity_resource' in srv.SpawnEntity.Request.get_fields_and_field_types()
+    return {'entity_resource': fields} if is_new else fields
+
+
 FLAGS = {name: True for name in ('set_pose', 'set_twist')
          if name in srv.SetEntityState.Request.get_fields_and_field_types()}
 
@@ -111,12 +120,16 @@ def test_numbers_of_single_services_are_those_of_the_messages():
                                                           'INCORRECT_TRANSITION')),
             (worlds, srv.LoadWorld.Response, ('UNSUPPORTED_FORMAT', 'NO_RESOURCE',
                                               'RESOURCE_PARSE_ERROR')),
-            (entities, srv.SetEntityState.Response, ('INVALID_POSE',))):
+            (entities, srv.SetEntityState.Response, ('INVALID_POSE',)),
+            (spawning, srv.SpawnEntity.Response, (
+                'NAME_NOT_UNIQUE', 'NAME_INVALID', 'UNSUPPORTED_FORMAT', 'NO_RESOURCE',
+                'NAMESPACE_INVALID', 'RESOURCE_PARSE_ERROR', 'UNSUPPORTED_ASSETS',
+                'INVALID_POSE'))):
         for name in names:
             assert getattr(module, name) == getattr(response, name)
     scope = srv.ResetSimulation.Request
-    assert (run_state.TIME, run_state.STATE, run_state.ALL) == (
-        scope.SCOPE_TIME, scope.SCOPE_STATE, scope.SCOPE_ALL)
+    assert (run_state.TIME, run_state.STATE, run_state.SPAWNED, run_state.ALL) == (
+        scope.SCOPE_TIME, scope.SCOPE_STATE, scope.SCOPE_SPAWNED, scope.SCOPE_ALL)
 
 
 def test_features_are_those_of_the_services_that_there_are(node, call):
@@ -126,8 +139,11 @@ def test_features_are_those_of_the_services_that_there_are(node, call):
         'get_entity_bounds': {'ENTITY_BOUNDS'}, 'get_entity_state': {'ENTITY_STATE_GETTING'},
         'get_entities_states': {'ENTITY_STATE_GETTING'},
         'set_entity_state': {'ENTITY_STATE_SETTING'}, 'get_entity_info': {'ENTITY_INFO_GETTING'},
-        'set_entity_info': {'ENTITY_INFO_SETTING'}, 'reset_simulation': {'SIMULATION_RESET',
-                                                                      'SIMULATION_RESET_STATE'},
+        'set_entity_info': {'ENTITY_INFO_SETTING'},
+        'reset_simulation': {'SIMULATION_RESET', 'SIMULATION_RESET_STATE',
+                             'SIMULATION_RESET_SPAWNED'},
+        'spawn_entity': {'SPAWNING', 'SPAWNING_RESOURCE_STRING'}, 'delete_entity': {'DELETING'},
+        'get_spawnables': {'SPAWNABLES'},
         'get_simulation_state': {'SIMULATION_STATE_GETTING'},
         'set_simulation_state': {'SIMULATION_STATE_SETTING', 'SIMULATION_STATE_PAUSE'},
         'step_simulation': {'STEP_SIMULATION_SINGLE', 'STEP_SIMULATION_MULTIPLE'},
@@ -141,7 +157,7 @@ def test_features_are_those_of_the_services_that_there_are(node, call):
     assert served == {f'/ragdoll/{name}' for name in by_service}
     assert set(told.features) == {getattr(msg.SimulatorFeatures, name)
                                   for names in by_service.values() for name in names}
-    assert node.simulation_interfaces.status == '15 services, 1 action'
+    assert node.simulation_interfaces.status == '18 services, 1 action'
 
 
 def test_states_follow_each_other_and_the_node_s_own_services(node, peer, call):
@@ -233,7 +249,8 @@ def test_a_reset_is_of_the_state_with_time_or_without(node, call):
         assert node.simulation.state.rows.tobytes() == start
     call('StepSimulation')
     before = node.simulation.state.rows.tobytes()
-    for scope in (1, 4, 5, 8, 10, 128):
+    assert code(call('ResetSimulation', scope=4)) == 1
+    for scope in (1, 5, 8, 10, 128):
         assert code(call('ResetSimulation', scope=scope)) == 0
     assert node.simulation.state.rows.tobytes() == before != start
 
@@ -368,6 +385,92 @@ def test_worlds_are_the_scenes(node, peer, call, tmp_path):
     assert code(call('GetAvailableWorlds', filter={'tags': ['indoor']})) == 0
 
 
+def test_dolls_are_spawned_and_deleted_while_time_goes_on(node, call):
+    call('StepSimulation', steps=5)
+    time, before = node.simulation.time, node.simulation.state.rows.tobytes()
+    pose = {'pose': {'position': {'x': -3.0, 'z': 2.0}, 'orientation': {'z': HALF, 'w': HALF}}}
+    response = call('SpawnEntity', name='anna', initial_pose=pose, **spawned('woman'))
+    assert (code(response), response.entity_name) == (1, 'anna')
+    assert row(call('GetEntityState', entity='anna').state)[:7] == pytest.approx(
+        [-3, 0, 2, 0, 0, HALF, HALF], abs=1e-12)
+    assert node.simulation.state.rows.tobytes().startswith(before)
+    assert code(call('SpawnEntity', name='anna', **spawned('woman'))) == 101
+    text = (ROOT / 'config/doll.yaml').read_text()
+    names = [call('SpawnEntity', name=name, allow_renaming=True, initial_pose={
+        'pose': {'position': {'x': -4.0 - index}}}, **spawned('', text)).entity_name
+        for index, name in enumerate(('anna', 'anna', '', ''))]
+    assert names == ['anna_2', 'anna_3', 'doll', 'doll_2']
+    found = call('GetEntities', filters={'filter': '^(man|anna|doll)'}).entities
+    assert list(found) == ['man', 'anna', *names]
+    # At the origin by default, the root: it is lifted onto the ground.
+    assert row(call('GetEntityState', entity='doll').state)[2] > 0.3
+    call('SetEntityInfo', entity='man', info={'description': 'stays'})
+    for name in names:
+        assert code(call('DeleteEntity', entity=name)) == 1
+    assert code(call('DeleteEntity', entity='doll')) == 2
+    assert call('GetEntityInfo', entity='man').info.description == 'stays'
+    assert node.simulation.time == time and node.paused
+    assert code(call('DeleteEntity', entity='man')) == 1
+    assert code(call('DeleteEntity', entity='anna')) == 4
+    for entity, wrong in (('anna/head', 0), (node.simulation.scene.bodies[0].name, 0)):
+        assert code(call('DeleteEntity', entity=entity)) == wrong
+
+
+def test_a_reset_takes_away_what_was_spawned(node, call):
+    call('SpawnEntity', **spawned('woman'), initial_pose={'pose': {'position': {'x': -3.0}}})
+    call('StepSimulation', steps=3)
+    assert code(call('ResetSimulation', scope=4)) == 1
+    assert [each.name for each in node.simulation.scene.dolls] == ['man']
+    assert node.simulation.time == 3 * node.simulation.tick
+    start = node.simulation.reset().rows.tobytes()
+    call('SpawnEntity', **spawned('woman'), initial_pose={'pose': {'position': {'x': -3.0}}})
+    assert code(call('DeleteEntity', entity='man')) == 1
+    call('StepSimulation', steps=3)
+    assert code(call('ResetSimulation')) == 1
+    assert [each.name for each in node.simulation.scene.dolls] == ['man']
+    assert node.simulation.time == 0 and node.simulation.state.rows.tobytes() == start
+    assert node.settings.pushed_bone == 'pelvis' and node.paused
+
+
+@pytest.mark.parametrize(('fields', 'wrong'), [
+    ({'name': 'a/b'}, 102), ({'name': 'step_1'}, 101), ({'entity_namespace': 'ns'}, 105),
+    ({**spawned('')}, 104), ({**spawned('robot.urdf')}, 103), ({**spawned('nowhere')}, 2),
+    ({**spawned('', 'dolls: []')}, 106), ({**spawned('crowd')}, 108),
+    ({'initial_pose': {'header': {'frame_id': 'map'}}}, 109),
+    ({'initial_pose': {'pose': {'position': {'x': math.nan}}}}, 109),
+    ({'initial_pose': {'pose': {'orientation': {'w': 0.0}}}}, 109)])
+def test_what_cannot_be_spawned_is_refused_with_the_standard_s_code(node, call, fields, wrong):
+    if fields.get('name') == 'step_1':
+        fields = {'name': node.simulation.scene.bodies[0].name}
+    before = node.simulation.state.rows.tobytes()
+    response = call('SpawnEntity', **{**spawned('woman'), **fields})
+    assert code(response) == wrong and response.result.error_message
+    assert node.simulation.state.rows.tobytes() == before
+    assert node.input_counts.refused == {'~/spawn_entity': 1}
+
+
+def test_spawnables_are_the_dolls_and_can_be_spawned(node, call):
+    listed = call('GetSpawnables')
+    uris = [getattr(each, 'entity_resource', each).uri for each in listed.spawnables]
+    assert code(listed) == 1 and uris == ['article_doll', 'character', 'doll', 'man', 'woman']
+    for index, (uri, each) in enumerate(zip(uris, listed.spawnables, strict=True)):
+        response = call('SpawnEntity', allow_renaming=True, **spawned(uri), initial_pose={
+            'pose': {'position': {'x': -3.0 - index, 'z': 2.0}}})
+        bounds = call('GetEntityBounds', entity=response.entity_name).bounds
+        np.testing.assert_allclose([[p.x, p.y, p.z] for p in bounds.points],
+                                   [[p.x, p.y, p.z] for p in each.spawn_bounds.points], atol=1e-9)
+    assert code(call('GetSpawnables', sources=['/'])) == 4
+
+
+def test_with_another_engine_nothing_is_spawned_and_the_features_say_so(node, call):
+    assert {0, 1, 9, 14, 23} <= set(call('GetSimulatorFeatures').features.features)
+    node.set_parameters([Parameter('engine', value='bullet')])
+    assert not {0, 1, 9, 14, 23} & set(call('GetSimulatorFeatures').features.features)
+    response = call('SpawnEntity', **spawned('woman'))
+    assert code(response) == 0 and 'expected rigid' in response.result.error_message
+    assert code(call('DeleteEntity', entity='man')) == 0
+
+
 def test_the_lines_of_the_documentation_are_served(node, peer, call):
     """In their order; the action by its own test."""
     text = Path(ROOT / 'docs/simulation_interfaces.md').read_text()
@@ -378,6 +481,8 @@ def test_the_lines_of_the_documentation_are_served(node, peer, call):
         given = yaml.safe_load(fields or '{}')
         if not FLAGS and name == 'LoadWorld':
             given = given['world_resource']
+        if not FLAGS and name == 'SpawnEntity':
+            given |= given.pop('entity_resource')
         if not FLAGS and name == 'SetEntityState':
             given = {key: value for key, value in given.items() if not key.startswith('set_')}
         assert topic == snake_case(name)
@@ -419,9 +524,9 @@ def test_nothing_that_is_called_harms_the_node(node, peer):
     chance = random.Random(7)
     names = [name for name in dir(srv) if name[0].isupper()
              and f'/ragdoll/{snake_case(name)}' in dict(node.get_service_names_and_types())]
-    assert len(names) == 15
-    for count in range(450):
-        name = names[count % 15]
+    assert len(names) == 18
+    for count in range(540):
+        name = names[count % 18]
         request = getattr(srv, name).Request()
         for field, kind in request.get_fields_and_field_types().items():
             setattr(request, field, rubbish(chance, kind))

@@ -93,6 +93,11 @@ uint16[] features
 string[] spawn_formats
 string custom_info
 """,
+    'msg/Spawnable.msg': """
+Resource entity_resource
+string description
+Bounds spawn_bounds
+""",
     'msg/TagsFilter.msg': """
 string[] tags
 uint8 FILTER_MODE_ANY=0
@@ -104,6 +109,11 @@ string name
 Resource world_resource
 string description
 string[] tags
+""",
+    'srv/DeleteEntity.srv': """
+string entity
+---
+Result result
 """,
     'srv/GetAvailableWorlds.srv': """
 string[] additional_sources
@@ -161,6 +171,12 @@ Result result
 ---
 SimulatorFeatures features
 """,
+    'srv/GetSpawnables.srv': """
+string[] sources
+---
+Result result
+Spawnable[] spawnables
+""",
     'srv/LoadWorld.srv': """
 Resource world_resource
 bool fail_on_unsupported_element
@@ -209,6 +225,25 @@ uint8 STATE_TRANSITION_ERROR=102
 uint8 INCORRECT_TRANSITION=103
 Result result
 """,
+    'srv/SpawnEntity.srv': """
+string name
+bool allow_renaming
+Resource entity_resource
+string entity_namespace
+geometry_msgs/PoseStamped initial_pose
+---
+uint8 NAME_NOT_UNIQUE=101
+uint8 NAME_INVALID=102
+uint8 UNSUPPORTED_FORMAT=103
+uint8 NO_RESOURCE=104
+uint8 NAMESPACE_INVALID=105
+uint8 RESOURCE_PARSE_ERROR=106
+uint8 MISSING_ASSETS=107
+uint8 UNSUPPORTED_ASSETS=108
+uint8 INVALID_POSE=109
+Result result
+string entity_name
+""",
     'srv/StepSimulation.srv': """
 uint64 steps 1
 ---
@@ -229,5 +264,9 @@ VERSION_1 = {
     'srv/SetEntityState.srv': VERSION_2['srv/SetEntityState.srv'].replace(
         'bool set_pose\nbool set_twist\nbool set_acceleration\n', ''),
     'srv/LoadWorld.srv': VERSION_2['srv/LoadWorld.srv'].replace(
-        'Resource world_resource\n', 'string uri\nstring resource_string\n')}
-"""Of 1.5.1, where these two differ."""
+        'Resource world_resource\n', 'string uri\nstring resource_string\n'),
+    'srv/SpawnEntity.srv': VERSION_2['srv/SpawnEntity.srv'].replace(
+        'Resource entity_resource\n', 'string uri\nstring resource_string\n'),
+    'msg/Spawnable.msg': VERSION_2['msg/Spawnable.msg'].replace(
+        'Resource entity_resource\n', 'string uri\n')}
+"""Of 1.5.1, where these four differ."""

@@ -7,6 +7,7 @@ import pytest
 from ragdoll_ros.ros.simulation_interfaces.entity_services import EntityServices
 from ragdoll_ros.ros.simulation_interfaces.servers import snake_case
 from ragdoll_ros.ros.simulation_interfaces.simulation_services import SimulationServices
+from ragdoll_ros.ros.simulation_interfaces.spawning import SpawnServices
 
 POLICY = Path(__file__).resolve().parent.parent / 'config' / 'ragdoll.policy.xml'
 
@@ -66,8 +67,9 @@ def test_the_policy_allows_what_the_node_does_and_no_more(make_node, given):
     publish, hear, answer, ask = given(node)
     assert publish | {'/tf'} == allowed('ragdoll', 'topics', 'publish')
     assert hear | {'/clock'} == allowed('ragdoll', 'topics', 'subscribe')  # use_sim_time's
-    standard = {f'/ragdoll/{snake_case(name)}' for services in (SimulationServices, EntityServices)
-                for name in services.FEATURES}  # where simulation_interfaces is installed
+    standard = {f'/ragdoll/{snake_case(name)}'  # where simulation_interfaces is installed
+                for services in (SimulationServices, EntityServices, SpawnServices)
+                for name in services.FEATURES}
     assert answer | standard == allowed('ragdoll', 'services', 'reply') and not ask
     assert allowed('ragdoll', 'actions', 'execute') == {'/ragdoll/simulate_steps'}
 

@@ -19,7 +19,7 @@ from samples import random_coordinates
 from simulation_interfaces_types import VERSION_1, VERSION_2
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.model import shapes
+from ragdoll_ros.model import rotation, shapes
 from ragdoll_ros.model.pose import Pose
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
@@ -31,7 +31,13 @@ from ragdoll_ros.ros.simulation_interfaces.entities import Category, Entities
 from ragdoll_ros.ros.simulation_interfaces.entity_services import EntityServices
 from ragdoll_ros.ros.simulation_interfaces.filters import Filters
 from ragdoll_ros.ros.simulation_interfaces.pattern import Pattern
-from ragdoll_ros.ros.simulation_interfaces.simulation_services import SimulationServices
+from ragdoll_ros.ros.simulation_interfaces.simulation_services import SimulationServices, features
+from ragdoll_ros.ros.simulation_interfaces.spawning import (
+    SpawnServices,
+    at_root_pose,
+    placement_of,
+    spawnables,
+)
 
 DOCS = (ROOT / 'docs/simulation_interfaces.md').read_text()
 
@@ -154,6 +160,33 @@ def test_the_box_of_a_turned_shape_is_tight():
     np.testing.assert_allclose([lower, upper], [centre - half, centre + half], atol=1e-12)
 
 
+def test_a_resource_is_one_doll_with_its_root_where_it_is_to_be():
+    """Whatever its axes are, and with joint angles of its own."""
+    text = ROOT.joinpath('config/drop.yaml').read_text()
+    turn = rotation.normalized(np.array([0.1, -0.2, 0.3, 0.9]))
+    for placement in (placement_of('woman', ''), placement_of('', text), placement_of('slope', ''),
+                      placement_of((ROOT / 'config/man.yaml').as_uri(), 'ignored')):
+        placed = at_root_pose(placement, Pose(np.array([1.0, 2, 3]), turn))
+        with Simulation(Scene('one', (placed,))) as simulation:
+            root = simulation.state.poses(simulation.scene.bone_index(placed.doll.root.name))
+            np.testing.assert_allclose(root.position, [1, 2, 3], atol=1e-12)
+            assert rotation.angle_between(root.orientation, turn) < 1e-7
+    assert {each.name for each in spawnables()} == {
+        'article_doll', 'character', 'doll', 'man', 'woman'}
+    heights = {each.name: np.ptp(each.box, axis=0)[2] for each in spawnables()}
+    assert 1.5 < heights['woman'] < heights['man'] < 1.9
+
+
+@pytest.mark.parametrize(('uri', 'text', 'code'), [
+    ('', ' ', 104), ('nowhere', '', 2), ('robot.urdf', '', 103), ('', '<robot/>', 103),
+    ('crowd', '', 108), ('', 'password: hunter2', 106), ('', 'dolls: [{doll: nobody}]', 106),
+    ('node', '', 106)])
+def test_a_resource_that_is_none_is_refused_with_the_standard_s_code(uri, text, code):
+    with pytest.raises(Refusal) as refused:
+        placement_of(uri, text)
+    assert refused.value.code == code and 'hunter2' not in str(refused.value)
+
+
 @pytest.mark.skipif(servers.srv is not None, reason='simulation_interfaces is installed')
 def test_a_node_without_the_package_says_what_is_missing(make_node):
     node = make_node()
@@ -171,12 +204,12 @@ def test_the_lines_of_the_documentation_have_the_fields_of_the_services():
         fields = yaml.safe_load(text or '{}')
         request = VERSION_2[f'{kind}/{name}.{kind}'].split('---')[0]
         assert set(fields) <= set(re.findall(r'^\S+ (\w+)', request, re.MULTILINE)), name
-    served = {*SimulationServices.FEATURES, *EntityServices.FEATURES}
+    served = {*SimulationServices.FEATURES, *EntityServices.FEATURES, *SpawnServices.FEATURES}
     rows = [line.split('|') for line in DOCS.split('```sh')[0].splitlines() if line[:3] == '| `']
     assert {name for row in rows for name in re.findall(r'`([a-z_]+)`', row[1])} == {
         servers.snake_case(name) for name in served} | {'simulate_steps'}
     assert sorted({int(number) for row in rows for number in re.findall(r'\d+', row[2])}) == (
-        servers.features(served))
+        features(served))
     assert {f'srv/{name}.srv' for name in served} <= set(VERSION_1)
 
 

@@ -25,8 +25,12 @@ def config_folder() -> Path:
 
 def scene_names() -> list[str]:
     """Names of the shipped scenes and dolls."""
-    return sorted(path.stem for path in config_folder().glob('*.yaml')
-                  if re.search(r'^(dolls|bones):', path.read_text(), re.MULTILINE))
+    return _names_with('dolls|bones')
+
+
+def doll_names() -> list[str]:
+    """Names of the shipped dolls."""
+    return _names_with('bones')
 
 
 def names_in(folder: str) -> list[str]:
@@ -34,6 +38,12 @@ def names_in(folder: str) -> list[str]:
     if not folder:
         return scene_names()
     return sorted(path.stem for path in (config_folder() / folder).glob('*.yaml'))
+
+
+def _names_with(keys: str) -> list[str]:
+    """Names of the files with one of these ``keys``, a regular expression."""
+    return sorted(path.stem for path in config_folder().glob('*.yaml')
+                  if re.search(f'^({keys}):', path.read_text(), re.MULTILINE))
 
 
 def find(name: str, beside: Path | None = None, folder: str = '') -> Path:

@@ -41,7 +41,7 @@ from .recovery import Recovery
 from .services import Services
 from .simulation_interfaces.servers import SimulationInterfaces
 from .stamps import Stamps
-from .ticker import QOS_EVENT_INTERVAL, SERVICE_INTERVAL, Ticker
+from .ticker import QOS_EVENT_INTERVAL, SERVICE_INTERVAL, Result, Ticker
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
@@ -156,6 +156,10 @@ class RagdollNode(Node):
         """Reset the simulation, bit-identically to its start, and publish its state."""
         self.simulation.reset(keep_time)
         self._publish_start()
+
+    def run_beside(self, make: Callable[[], Result]) -> Result:
+        """What ``make`` returns, which runs in a thread while the ticks go on."""
+        return self._ticker.run_beside(make)
 
     def change_dolls(self, change: Callable[[Simulation], object]) -> None:
         """Add or remove dolls by ``change(simulation)``; time goes on, topics and parameters
@@ -281,7 +285,7 @@ class RagdollNode(Node):
 
     def _load(self, name: str) -> Scene:
         """Load a scene, beside the ticks of the present one."""
-        return self._ticker.run_beside(lambda: load_scene(name))
+        return self.run_beside(lambda: load_scene(name))
 
     def _prepare(self, changed: set[str], settings: NodeSettings, scene: Scene) -> None:
         """Before a change is accepted, create the simulation that it needs, as that may fail."""
@@ -289,7 +293,7 @@ class RagdollNode(Node):
             self._prepared.close()
             self._prepared = None
         if changed & {'scene', 'engine', 'workers'}:
-            self._prepared = self._ticker.run_beside(lambda: make_simulation(scene, settings))
+            self._prepared = self.run_beside(lambda: make_simulation(scene, settings))
 
     def _apply(self, changed: set[str]) -> None:
         """Carry out a change of the settings."""

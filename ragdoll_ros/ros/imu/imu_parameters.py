@@ -1,6 +1,7 @@
 """The parameter ``imus``: each entry names a bone and where on it the sensor is mounted."""
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 
 from rclpy.exceptions import InvalidTopicNameException
@@ -46,13 +47,17 @@ def check_imus(imus: Sequence[str], bones: Sequence[str]) -> None:
 
 
 def renamed_imus(imus: Sequence[str], change: SceneChange) -> tuple[str, ...]:
-    """The entries of bones that stay in a scene, by their new names; one empty text for none."""
+    """The entries of bones that stay in a scene, by their new names, if topics may contain these;
+    one empty text for none.
+    """
     found = []
     for text in map(str.strip, filter(str.strip, imus)):
         bone = parse_mount(text, change.before.bone_names).bone
-        if bone in change.bone_names:
-            found.append(change.bone_names[bone] + text[len(bone):])
-    return tuple(found) or ('',)
+        renamed = change.bone_names.get(bone, '') + text[len(bone):]
+        with contextlib.suppress(errors.ModelError):
+            check_imus([renamed], change.after.bone_names)
+            found.append(renamed)
+    return tuple(filter(str.strip, found)) or ('',)
 
 
 def imu_topic(bone: str) -> str:

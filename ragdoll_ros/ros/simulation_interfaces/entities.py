@@ -1,7 +1,7 @@
 """What a scene has to name: its dolls and static bodies, and each bone as doll/bone."""
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -100,13 +100,14 @@ class Entity:
 
 
 class Entities:
-    """The entities of a scene."""
+    """The entities of a scene; ``infos`` of those that it has are as if set by set_info()."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, infos: Mapping[str, Info] | None = None) -> None:
         self._scene = scene
-        self._infos: dict[str, Info] = {}
-        """What set_info() has set."""
         self._listed = {each.name: each for each in (*_dolls(scene), *_bodies(scene))}
+        self.infos = {name: info for name, info in (infos or {}).items()
+                      if name in self._listed or name in self._bones}
+        """What set_info() has set, by name."""
 
     def __iter__(self) -> Iterator[Entity]:
         """All but the bones: dolls, then static bodies."""
@@ -122,7 +123,7 @@ class Entities:
 
     def info(self, entity: Entity) -> Info:
         """What the entity is, as set last."""
-        return self._infos.get(entity.name, entity.info)
+        return self.infos.get(entity.name, entity.info)
 
     def set_info(self, entity: Entity, info: Info) -> None:
         """Replace what the entity is. Raises Refusal for too many or too long texts."""
@@ -130,7 +131,7 @@ class Entities:
         if longest > MAX_TEXT or len(info.tags) > MAX_TAGS:
             raise Refusal(Code.OPERATION_FAILED, f'info: {longest} characters, {len(info.tags)} '
                           f'tags; expected at most {MAX_TEXT} characters, {MAX_TAGS} tags')
-        self._infos[entity.name] = info
+        self.infos[entity.name] = info
 
     @cached_property
     def _bones(self) -> dict[str, Entity]:

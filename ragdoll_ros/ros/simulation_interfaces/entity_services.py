@@ -7,6 +7,7 @@ from typing import Any
 from ...model.drive import MAX_SPEED
 from ...model.ragdoll import WORLD
 from ...model.scene import Scene
+from ...physics.simulation import Simulation
 from ..inputs.subscriptions import limited
 from ..messages.convert import to_header, to_pose, to_vector
 from .bounds import Kind, Volume, own_box
@@ -38,6 +39,7 @@ class EntityServices:
     def __init__(self, controlled: ControlledNode, messages: Any,
                  after: Callable[[], None]) -> None:
         self._controlled, self._messages, self._after = controlled, messages, after
+        self._simulation: Simulation | None = None
         self._scene: Scene | None = None
         self.handlers = {
             'GetEntities': self._get_entities, 'GetEntitiesStates': self._get_entities_states,
@@ -47,10 +49,12 @@ class EntityServices:
 
     @property
     def entities(self) -> Entities:
-        """Those of the current scene."""
-        scene = self._controlled.simulation.scene
-        if scene is not self._scene:
-            self._scene, self._entities = scene, Entities(scene)
+        """Those of the current scene. Infos are kept while dolls come and go."""
+        simulation = self._controlled.simulation
+        if simulation.scene is not self._scene:
+            self._entities = Entities(simulation.scene, self._entities.infos if (
+                simulation is self._simulation) else {})
+            self._simulation, self._scene = simulation, simulation.scene
         return self._entities
 
     def _get_entities(self, request: Any, response: Any) -> None:

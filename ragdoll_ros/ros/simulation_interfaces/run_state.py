@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from ...physics.simulation import Simulation
 from ..parameters.node_settings import NodeSettings
@@ -18,6 +18,9 @@ ALREADY_IN_TARGET_STATE, INCORRECT_TRANSITION = 101, 103
 
 TIME, STATE, SPAWNED, ALL = 1, 2, 4, 255
 """Scopes of a reset, bits but for ALL; 0 is ALL as well."""
+
+
+Result = TypeVar('Result')
 
 
 class RunningState(IntEnum):
@@ -41,6 +44,12 @@ class ControlledNode(Controlled, Protocol):
     @property
     def stamp(self) -> int:
         """Stamp of the current state, ns."""
+
+    def run_beside(self, make: Callable[[], Result]) -> Result:
+        """What ``make`` returns; ticks go on meanwhile."""
+
+    def change_dolls(self, change: Callable[[Simulation], object]) -> None:
+        """Add or remove dolls by ``change(simulation)``; time goes on, topics follow."""
 
 
 class RunState:
@@ -90,16 +99,19 @@ class RunState:
             self._controlled.pause(True)
         self._stopped = self.run
 
-    def reset(self, scope: int) -> None:
-        """Reset the state, and time unless the scope leaves it out; then go on as before.
-
-        Nothing is ever spawned. Raises Refusal for a scope without the state.
-        """
-        scope = scope or ALL
-        if not scope & STATE or (scope > TIME | STATE | SPAWNED and scope != ALL):
-            raise Refusal(Code.FEATURE_UNSUPPORTED, f'scope: {scope}; expected 0 or 255 (all), '
-                          '3 (time and state) or 2 (state)')
+    def reset(self, reset: Callable[[], object]) -> None:
+        """Go back to a start by ``reset()``, and go on as before: stopped, paused or playing."""
         was_stopped = self.state == RunningState.STOPPED
-        self._controlled.reset(keep_time=not scope & TIME)
+        reset()
         if was_stopped:
             self._stopped = self.run
+
+
+def checked_scope(scope: int) -> int:
+    """The scope of a reset; 0 is ALL. Raises Refusal for time without state, and unknown bits."""
+    scope = scope or ALL
+    known = scope <= TIME | STATE | SPAWNED and scope != TIME and scope != TIME | SPAWNED
+    if scope != ALL and not known:
+        raise Refusal(Code.FEATURE_UNSUPPORTED, f'scope: {scope}; expected 0 or 255 (all), 2 '
+                      '(state), 3 (time and state), 4 (spawned), or 6 or 7')
+    return scope

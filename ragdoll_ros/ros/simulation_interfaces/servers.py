@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.action import ActionServer
@@ -16,8 +16,8 @@ from .codes import Code
 from .entity_services import EntityServices
 from .run_state import ControlledNode, RunState
 from .simulation_services import SimulationServices
+from .spawning import SpawnServices
 from .stepping import Stepper
-from .worlds import World
 
 try:
     from simulation_interfaces import action, msg, srv
@@ -44,21 +44,23 @@ class SimulationInterfaces:
             self.status = f'not served, as simulation_interfaces is not installed: {MISSING}'
             return
         run_state = RunState(controlled, self._shut_down)
-        simulation = SimulationServices(
-            run_state, Stepper(node, steady, controlled, run_state), msg, action,
-            node.set_parameters_atomically, self._world)
         entities = EntityServices(controlled, msg, after)
+        spawning = SpawnServices(controlled, msg, lambda: entities.entities)
+        simulation = SimulationServices(
+            controlled, run_state, Stepper(node, steady, controlled, run_state), msg, action,
+            node.set_parameters_atomically, spawning)
         # In a group of their own, as StepSimulation waits: others are served meanwhile.
         self._group = ReentrantCallbackGroup()
         served = {name: handler for name, handler in {
-            **simulation.handlers, **entities.handlers}.items() if hasattr(srv, name)}
+            **simulation.handlers, **entities.handlers, **spawning.handlers}.items()
+            if hasattr(srv, name)}
         for name, handler in served.items():
             self._serve(name, handler)
         self.actions.append(ActionServer(
             node, action.SimulateSteps, '~/simulate_steps', simulation.simulate_steps,
             callback_group=self._group, cancel_callback=simulation.accept_cancel,
             result_timeout=RESULT_TIMEOUT))
-        simulation.features = features(served)
+        simulation.served = tuple(served)
         self.status = f'{len(served)} services, 1 action'
 
     def destroy(self) -> None:
@@ -88,10 +90,6 @@ class SimulationInterfaces:
 
         self._node.create_service(getattr(srv, name), topic, serve, callback_group=self._group)
 
-    def _world(self) -> World:
-        scene = self._controlled.simulation.scene
-        return World(scene.name, self._controlled.settings.scene, scene.description)
-
     def _shut_down(self) -> None:
         """End the process as a signal does, soon."""
         self._node.get_logger().info('quitting, as ~/set_simulation_state asks')
@@ -101,10 +99,3 @@ class SimulationInterfaces:
 def snake_case(name: str) -> str:
     """GetEntities as get_entities."""
     return re.sub('(?<=[a-z])(?=[A-Z])', '_', name).lower()
-
-
-def features(served: Iterable[str]) -> list[int]:
-    """Features of the action and of the services that are served, as numbers, ascending."""
-    possible = {**SimulationServices.FEATURES, **EntityServices.FEATURES}
-    return sorted({*SimulationServices.ACTION_FEATURES,
-                   *(feature for name in served for feature in possible[name])})

@@ -1,16 +1,22 @@
 """Services on the simulation as a whole: features, state, reset, steps, worlds."""
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rclpy.action import CancelResponse
 from rclpy.parameter import Parameter
 
 from .codes import Code, Feature, Refusal
-from .run_state import RunState
+from .entity_services import EntityServices
+from .run_state import ALL, SPAWNED, STATE, TIME, ControlledNode, RunState, checked_scope
+from .spawning import ENGINE, SPAWN_FORMATS, SpawnServices
 from .stepping import Stepper
 from .worlds import RESOURCE_PARSE_ERROR, World, available, scene_of
+
+SPAWNING = {Feature.SIMULATION_RESET_SPAWNED,
+            *(feature for each in SpawnServices.FEATURES.values() for feature in each)}
+"""Features that one engine has."""
 
 INFO = ('ragdoll_ros: docs/simulation_interfaces.md; entities are dolls, static bodies, and bones '
         'as doll/bone; accelerations are not filled')
@@ -20,14 +26,15 @@ class SimulationServices:
     """Handlers, each ``(request, response)``, which raise Refusal.
 
     ``messages``, ``actions``: the modules simulation_interfaces.msg and .action.
-    ``set_parameters``: the node's set_parameters_atomically. ``world()``: the current scene.
+    ``set_parameters``: the node's set_parameters_atomically.
     """
 
     FEATURES = {
         'GetSimulatorFeatures': (),
         'GetSimulationState': (Feature.SIMULATION_STATE_GETTING,),
         'SetSimulationState': (Feature.SIMULATION_STATE_SETTING, Feature.SIMULATION_STATE_PAUSE),
-        'ResetSimulation': (Feature.SIMULATION_RESET, Feature.SIMULATION_RESET_STATE),
+        'ResetSimulation': (Feature.SIMULATION_RESET, Feature.SIMULATION_RESET_STATE,
+                            Feature.SIMULATION_RESET_SPAWNED),
         'StepSimulation': (Feature.STEP_SIMULATION_SINGLE, Feature.STEP_SIMULATION_MULTIPLE),
         'GetAvailableWorlds': (Feature.AVAILABLE_WORLDS,),
         'LoadWorld': (Feature.WORLD_LOADING,),
@@ -36,12 +43,14 @@ class SimulationServices:
 
     ACTION_FEATURES = (Feature.STEP_SIMULATION_ACTION,)
 
-    def __init__(self, run_state: RunState, stepper: Stepper, messages: Any,
-                 actions: Any, set_parameters: Callable, world: Callable[[], World]) -> None:
-        self._run_state, self._stepper = run_state, stepper
+    def __init__(self, controlled: ControlledNode, run_state: RunState, stepper: Stepper,
+                 messages: Any, actions: Any, set_parameters: Callable,
+                 spawning: SpawnServices) -> None:
+        self._controlled, self._run_state, self._stepper = controlled, run_state, stepper
         self._messages, self._actions = messages, actions
-        self._set_parameters, self._world = set_parameters, world
-        self.features: list[int] = []
+        self._set_parameters, self._spawning = set_parameters, spawning
+        self.served: tuple[str, ...] = ()
+        """Names of the services that are served."""
         self.handlers = {
             'GetSimulatorFeatures': self._get_features, 'GetSimulationState': self._get_state,
             'SetSimulationState': self._set_state, 'ResetSimulation': self._reset,
@@ -74,7 +83,8 @@ class SimulationServices:
         return CancelResponse.ACCEPT
 
     def _get_features(self, _: Any, response: Any) -> None:
-        response.features.features = self.features
+        response.features.features = features(self.served, self._controlled.simulation.engine_name)
+        response.features.spawn_formats = list(SPAWN_FORMATS)
         response.features.custom_info = INFO
 
     def _get_state(self, _: Any, response: Any) -> None:
@@ -84,7 +94,15 @@ class SimulationServices:
         self._run_state.set(request.state.state)
 
     def _reset(self, request: Any, _: Any) -> None:
-        self._run_state.reset(request.scope)
+        """All is the world as it was loaded; other scopes keep what was deleted away."""
+        scope, spawning = checked_scope(request.scope), self._spawning
+        if scope == ALL and spawning.has_changed:
+            self._run_state.reset(lambda: self._set_scene(self._controlled.settings.scene))
+            return
+        if scope & SPAWNED:
+            spawning.remove_spawned()
+        if scope & STATE:
+            self._run_state.reset(lambda: self._controlled.reset(keep_time=not scope & TIME))
 
     async def _step(self, request: Any, _: Any) -> None:
         await self._stepper.step(request.steps)
@@ -99,15 +117,21 @@ class SimulationServices:
     def _load_world(self, request: Any, response: Any) -> None:
         """Version 2 has a Resource, version 1 its fields."""
         resource = getattr(request, 'world_resource', request)
-        scene = scene_of(resource.uri, resource.resource_string)
-        done = self._set_parameters([Parameter('scene', value=scene)])
-        if not done.successful:
-            raise Refusal(RESOURCE_PARSE_ERROR, done.reason)
+        self._set_scene(scene_of(resource.uri, resource.resource_string))
         self._run_state.stop()
         self._fill(response.world, self._world())
 
     def _get_current_world(self, _: Any, response: Any) -> None:
         self._fill(response.world, self._world())
+
+    def _set_scene(self, name: str) -> None:
+        done = self._set_parameters([Parameter('scene', value=name)])
+        if not done.successful:
+            raise Refusal(RESOURCE_PARSE_ERROR, done.reason)
+
+    def _world(self) -> World:
+        scene = self._controlled.simulation.scene
+        return World(scene.name, self._controlled.settings.scene, scene.description)
 
     @staticmethod
     def _fill(resource: Any, world: World) -> Any:
@@ -115,3 +139,13 @@ class SimulationServices:
         resource.name, resource.description = world.name, world.description
         resource.world_resource.uri = world.uri
         return resource
+
+
+def features(served: Iterable[str], engine: str = ENGINE) -> list[int]:
+    """Features of the action and of the services that are served, as numbers, ascending; without
+    spawning where the engine cannot.
+    """
+    possible = {**SimulationServices.FEATURES, **EntityServices.FEATURES, **SpawnServices.FEATURES}
+    found = {*SimulationServices.ACTION_FEATURES,
+             *(feature for name in served for feature in possible[name])}
+    return sorted(found if engine == ENGINE else found - SPAWNING)

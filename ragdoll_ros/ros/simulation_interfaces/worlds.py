@@ -40,14 +40,16 @@ def available(sources: Sequence[str], continue_on_error: bool) -> tuple[list[Wor
     return [World(name, name, _description(name)) for name in scene_names()], reason
 
 
-def scene_of(uri: str, text: str) -> str:
-    """Value of the parameter `scene` for a resource. Raises Refusal; says nothing of a file."""
+def scene_of(uri: str, text: str, unsupported: int = UNSUPPORTED_FORMAT) -> str:
+    """Value of the parameter `scene` for a resource. Raises Refusal, with the code ``unsupported``
+    for a file that is not YAML; says nothing of a file.
+    """
     if not uri:
         raise (Refusal(Code.FEATURE_UNSUPPORTED, 'resource_string: expected a uri') if text else
                Refusal(NO_RESOURCE, 'uri: expected a name in config/ or a path'))
     scene = unquote(uri.removeprefix('file://')) if uri.startswith('file:///') else uri
     if not scene.lower().endswith(FORMATS) and re.search(r'\.\w+$', scene):
-        raise Refusal(UNSUPPORTED_FORMAT, f'uri: {uri[:60]!r}; expected a scene as YAML')
+        raise Refusal(unsupported, f'uri: {uri[:60]!r}; expected a scene as YAML')
     try:
         find(scene)
     except RagdollError as error:
