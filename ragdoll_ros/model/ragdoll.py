@@ -382,8 +382,10 @@ class Ragdoll:
         joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
                                            child=rename(joint.child)) for joint in self.joints)
         pairs = tuple((rename(first), rename(second)) for first, second in self.no_collision)
-        swings, riders = (tuple(dataclasses.replace(each, bone=rename(each.bone)) for each in those)
-                          for those in (self.swings, self.riders))
+        swings = tuple(dataclasses.replace(swing, bone=rename(swing.bone))
+                       for swing in self.swings)
+        riders = tuple(dataclasses.replace(rider, bone=rename(rider.bone))
+                       for rider in self.riders)
         return dataclasses.replace(self, bones=bones, joints=joints, no_collision=pairs,
                                    swings=swings, riders=riders)
 
