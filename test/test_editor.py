@@ -447,6 +447,67 @@ def test_handles_move_turn_and_resize(desk):
     assert desk.editor.scene == DROP
 
 
+TABLE = load_scene('table')
+
+
+def test_a_static_body_is_moved_sized_saved_and_undone(server, tmp_path):
+    desk = Desk(server, tmp_path, TABLE)
+    desk.editor.select_static('table')
+    shown = {key for key in ('position', 'mass', 'friction') if desk.panel.body[key].visible}
+    assert shown == {'position', 'friction'}, 'a static body has no mass'
+    desk.panel.body['position'].value = '1 0.5 0.2'
+    desk.panel.body['friction'].value = '0.25'
+    desk.editor.update()
+    edited = desk.editor.scene
+    found = next(body for body in edited.bodies if body.name == 'table')
+    assert (found.position, found.friction) == ((1, 0.5, 0.2), 0.25)
+    before = next(body for body in TABLE.bodies if body.name == 'table')
+    assert dataclasses.replace(found, position=before.position, friction=None) == before
+    assert edited.dolls == TABLE.dolls
+    desk.files.name.value = 'moved'
+    desk.files.save()
+    assert load_scene(str(tmp_path / 'moved.yaml')) == edited
+    desk.editor.undo()
+    assert desk.editor.scene == TABLE and desk.panel.body['position'].value != '1 0.5 0.2'
+
+
+def test_static_bodies_come_and_go(desk):
+    desk.editor.add_static('crate')
+    crate, = desk.editor.scene.bodies
+    assert desk.editor.static == desk.panel.static.value == 'crate'
+    assert crate.shape.size == (0.4, 0.4, 0.4) and crate.position[2] == 0.2
+    desk.panel.body['size'].value = '1 0.5 0.4'
+    desk.editor.update()
+    assert desk.editor.scene.bodies[0].shape.size == (1, 0.5, 0.4)
+    desk.editor.suggest('shape', 'cylinder')
+    assert desk.panel.body['length'].value == '1', 'the longest side becomes the length'
+    desk.editor.add_static('world')
+    assert desk.panel.body['size'].value == '0.4, 0.4, 0.4'
+    desk.editor.undo()
+    desk.editor.add_static('crate')
+    assert 'unique' in html.unescape(desk.panel.message.content)
+    desk.editor.select('left_shin')
+    assert desk.editor.static is None and desk.panel.body['mass'].visible
+    desk.editor.select_static('crate')
+    assert desk.editor.bones == ()
+    desk.editor.remove_static()
+    assert desk.editor.scene == DROP and desk.editor.static is None
+    desk.editor.undo()
+    assert desk.editor.scene.bodies[0].name == 'crate'
+
+
+def test_handles_move_and_size_a_static_body(desk):
+    desk.editor.add_static('crate')
+    desk.editor.toggle()
+    handles = desk.editor.handles
+    drag(handles.body, (2, 0, 0.2))
+    assert desk.editor.scene.bodies[0].position == (2, 0, 0.2)
+    desk.editor.set_mode('size')
+    drag(handles.size, (0.5, 0.25, 0.2))
+    assert desk.editor.scene.bodies[0].shape.size == pytest.approx((1, 0.5, 0.4))
+    assert desk.editor.scene.dolls == DROP.dolls
+
+
 def test_handles_go_in_steps_if_so_chosen(desk):
     """Of 1 cm along the body's own axes, of 5 degrees, and of 1 cm of an edge."""
     desk.editor.select('left_forearm')

@@ -17,7 +17,7 @@ from ..browser.scripts import add_listener
 from ..viser_internals import handle_id
 from ..widgets.error_text import error_text
 from ..widgets.form import FormValues
-from . import bone_form, changes, mirror
+from . import bone_form, changes, mirror, static_bodies
 from .banner import MODES, Banner
 from .edited_scene import EditedScene, Reason
 from .files_panel import FilesPanel
@@ -51,12 +51,14 @@ class Editor:
         self._was_paused = False
         self.bones: tuple[str, ...] = ()
         """Names of the selected bones, the last one that was selected at the end."""
+        self.static: str | None = None
+        """Name of the static body that is selected, in place of bones."""
         self.editing = False
         """Whether the source is paused in the bind pose."""
         self.ranges = JointHandles(server, lambda limits: self._in_order.submit(
             self._on_limits, limits))
         self.handles = BodyHandles(server, self.ranges, self._on_pose, self._on_size)
-        self.panel = EditorPanel(server.gui, self.select, self.suggest)
+        self.panel = EditorPanel(server.gui, self.select, self.select_static, self.suggest)
         self._connect(server.gui)
         with server.gui.add_folder('Files'):
             self.files = FilesPanel(server, lambda: self.scene, self.set_scene, SceneFolder(folder))
@@ -86,9 +88,16 @@ class Editor:
             if add:
                 others = tuple(each for each in self.bones if each != bone)
                 bones = others if bone in self.bones else others + bones
-            if bones != self.bones:
-                self.bones = bones
+            if bones != self.bones or (bones and self.static):
+                self.bones, self.static = bones, None
                 self._refresh()
+
+    def select_static(self, body: str | None) -> None:
+        """Select a static body in place of all bones; None deselects it."""
+        with self._display_lock:
+            self.static = body
+            self.bones = () if body else self.bones
+            self._refresh()
 
     def toggle(self) -> None:
         """Start editing in the bind pose, or end it and run."""
@@ -143,15 +152,23 @@ class Editor:
     def suggest(self, key: str, kind: str) -> None:
         """Fill the form with values for another kind of shape or joint, to be edited further."""
         with self._reporting_errors():
-            name = _existing(self.bone)
             change = changes.set_shape if key == 'shape' else changes.set_joint_kind
             form = self.panel.body if key == 'shape' else self.panel.joint
+            if self.static:
+                scene = static_bodies.change_body(
+                    self.scene, self.static, lambda scene, name: change(scene, name, kind))
+                form.fill(static_bodies.read_body(scene, self.static))
+                return
+            name = _existing(self.bone)
             form.fill(bone_form.read_bone(change(self.scene, name, kind), name))
 
     def show_handles(self) -> None:
         """Show handles on the selected bone while editing, otherwise none."""
         with self._display_lock:
-            if self.editing and len(self.bones) == 1:
+            if self.editing and self.static:
+                self.handles.show(static_bodies.stand_in(self.scene, self.static),
+                                  static_bodies.BONE, limb=False)
+            elif self.editing and len(self.bones) == 1:
                 self.handles.show(self.scene, self.bones[0], self.panel.limb.value)
             elif self.editing and self.bones:
                 self.handles.show_outlines(self.scene, self.bones)
@@ -172,6 +189,19 @@ class Editor:
             name = _existing(self.bone)
             self.set_scene(changes.remove_limb(self.scene, name), f'remove {name}')
 
+    def add_static(self, name: str) -> None:
+        """Add a static body and select it."""
+        with self._reporting_errors():
+            self.set_scene(static_bodies.add_body(self.scene, name.strip()), f'add {name.strip()}')
+            self.select_static(name.strip())
+
+    def remove_static(self) -> None:
+        """Remove the selected static body."""
+        with self._reporting_errors():
+            if self.static:
+                self.set_scene(static_bodies.remove_body(self.scene, self.static),
+                               f'remove {self.static}')
+
     def _connect(self, gui: viser.GuiApi) -> None:
         """Connect the panel's buttons, and hotkeys."""
         panel = self.panel
@@ -181,6 +211,8 @@ class Editor:
         panel.update.on_click(lambda _: self.update())
         panel.add.on_click(lambda _: self.add_bone(panel.name.value))
         panel.remove.on_click(lambda _: self.remove_limb())
+        panel.add_static.on_click(lambda _: self.add_static(panel.static_name.value))
+        panel.remove_static.on_click(lambda _: self.remove_static())
         for button, label, key, modifier, action in (
                 (panel.edit, 'Edit or run', None, None, self.toggle),
                 (panel.undo, 'Undo', 'Z', 'cmd/ctrl', self.undo),
@@ -204,6 +236,8 @@ class Editor:
             self._in_order.submit(self._apply, *self._typed())
         elif field == handle_id(self.panel.name):
             self._in_order.submit(self.add_bone, self.panel.name.value)
+        elif field == handle_id(self.panel.static_name):
+            self._in_order.submit(self.add_static, self.panel.static_name.value)
 
     def _typed(self) -> tuple[tuple[str, ...], FormValues, list[errors.ModelError]]:
         """The selected bones, the values of the form, and errors of those that cannot be read."""
@@ -234,9 +268,13 @@ class Editor:
                 bones: tuple[str, ...]) -> None:
         """Change bones, on both sides if so chosen, as one step; if refused, reset the handles."""
         with self._reporting_errors():
-            last = _existing(bones[-1] if bones else None)
             scene = self.scene
             try:
+                if self.static and not bones:
+                    self.set_scene(static_bodies.change_body(scene, self.static, change),
+                                   f'{action} {self.static}')
+                    return
+                last = _existing(bones[-1] if bones else None)
                 for name in bones:
                     scene = change(scene, name)
                     if self.panel.both.value:
@@ -269,11 +307,15 @@ class Editor:
         bones = tuple(bone for bone in self.bones if bone in scene.bone_names)
         keep_typed = keep_typed and bones == self.bones
         self.bones = bones
+        if self.static not in {body.name for body in scene.bodies}:
+            self.static = None
         self.panel.show_bones(scene, bones)
+        self.panel.show_static(scene, self.static)
         self.panel.show_history(self._edited.history)
         joints = [changes.joint_of(scene, bone) for bone in bones]
-        self.panel.show_values(bone_form.read_bones(scene, bones) if bones else {},
-                               [joint.parent for joint in joints if joint], keep_typed)
+        values = bone_form.read_bones(scene, bones) if bones else (
+            static_bodies.read_body(scene, self.static) if self.static else {})
+        self.panel.show_values(values, [joint.parent for joint in joints if joint], keep_typed)
         self.show_handles()
 
     @contextmanager

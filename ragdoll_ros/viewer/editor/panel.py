@@ -14,7 +14,10 @@ from ..widgets.form import GREY, RED, CallbackGuard, Form, FormValues, colored
 from .bone_form import BODY, JOINT
 from .undo_history import UndoHistory
 
-NONE = '(no bone)'
+NONE, NO_BODY = '(no bone)', '(no body)'
+
+MOST_LISTED = 1000
+"""Static bodies in the list: a page of more names is slow."""
 
 KEYS = {field.key for field in (*BODY, *JOINT)}
 
@@ -23,10 +26,11 @@ class EditorPanel:
     """Widgets in the GUI container that is current; the editor connects the buttons.
 
     ``select`` takes the name of a bone, or None, and whether other selected bones stay selected;
-    ``suggest`` is a Form's ``on_kind``.
+    ``select_static`` takes that of a static body, or None; ``suggest`` is a Form's ``on_kind``.
     """
 
     def __init__(self, gui: viser.GuiApi, select: Callable[[str | None, bool], None],
+                 select_static: Callable[[str | None], None],
                  suggest: Callable[[str, str], None]) -> None:
         self._filling = CallbackGuard()
         self.edit = gui.add_button('Edit', icon='pencil',
@@ -58,6 +62,11 @@ class EditorPanel:
             self.name = gui.add_text('Name', 'new bone')
             self.add = gui.add_button('Add a bone here', icon='plus')
             self.remove = gui.add_button('Remove this limb', icon='trash')
+        with gui.add_folder('Static bodies', expand_by_default=False):
+            self.static = gui.add_dropdown('Static body', (NO_BODY,), hint='A wall, a stair')
+            self.static_name = gui.add_text('Its name', 'new body')
+            self.add_static = gui.add_button('Add a body', icon='cube-plus')
+            self.remove_static = gui.add_button('Remove this body', icon='trash', visible=False)
         self.parent = ''
         """Bone to which another one is added."""
         self._roots: dict[str, str] = {}
@@ -65,6 +74,15 @@ class EditorPanel:
             self._roots.get(self.doll.value), False))
         self.bone.on_update(lambda _: self._filling.active or select(
             None if self.bone.value == NONE else self.bone.value, False))
+        self.static.on_update(lambda _: self._filling.active or select_static(
+            None if self.static.value == NO_BODY else self.static.value))
+
+    def show_static(self, scene: Scene, selected: str | None) -> None:
+        """List the first MOST_LISTED static bodies, of which one may be selected."""
+        names = (body.name for body in scene.bodies[:MOST_LISTED])
+        with self._filling:
+            _set_options(self.static, (NO_BODY, *names), selected or NO_BODY)
+        self.remove_static.visible = selected is not None
 
     def show_bones(self, scene: Scene, selected: Sequence[str]) -> None:
         """List all dolls, and the bones of one: that of the last selected bone, or the first."""
@@ -90,10 +108,12 @@ class EditorPanel:
         """
         self.show_message('')
         is_one = 'position' in values
-        for part in (self.body_folder, self.update, self.both):
+        is_bone = 'mass' in values
+        for part in (self.body_folder, self.update):
             part.visible = bool(values)
-        for part in (self.limb, self.snap, self.remove):
-            part.visible = is_one
+        self.both.visible, self.snap.visible = is_bone, is_one
+        for part in (self.limb, self.remove):
+            part.visible = is_one and is_bone
         self.joint_folder.visible = 'damping' in values
         self.joint_folder.label = f'Joint to {parents[0]}' if is_one and parents else 'Joints'
         self.body.fill(values, keep_typed)
