@@ -25,7 +25,7 @@ from ragdoll_ros.physics.logged_simulation import (
 from ragdoll_ros.physics.simulation import Simulation
 
 QUIET = {'checkpoint', 'advance', 'run', 'measures', 'ledger', 'close', 'swings', 'contacts',
-         'coordinates', 'starts', 'parts', 'trail'}
+         'coordinates', 'starts', 'parts', 'trail', 'record_impacts'}
 """Public names of Simulation that change nothing, or only by the ticks that are counted, and its
 deprecated names, which lead to new ones."""
 

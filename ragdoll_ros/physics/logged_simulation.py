@@ -160,12 +160,19 @@ def state_digest(state: State) -> str:
     return hashlib.sha256(np.ascontiguousarray(state.rows, '<f8')).hexdigest()
 
 
+def _call_of(method: str) -> Callable[..., object]:
+    """What calls a method of Simulation with the arguments of an event."""
+    def call(simulation: Simulation, **arguments: object) -> object:
+        return getattr(simulation, method)(**arguments)
+    return call
+
+
 _ACTIONS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
-    **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
-       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state',
-                    'drive_body', 'add', 'remove')},
+    **{name: _call_of(name) for name in (
+        'release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state', 'drive_body', 'add',
+        'remove')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),
     'parts': lambda simulation, parts: setattr(simulation, 'samples_per_tick', parts),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),

@@ -15,7 +15,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...model import errors
-from ..kernels.maths.oscillator import drive_oscillators
 
 RANGES = {'mount_frequency': (0.0, 1000.0), 'mount_damping': (0.0, 10.0),
           'bandwidth': (0.0, 1000.0)}
@@ -78,13 +77,16 @@ class Oscillators:
     """
 
     def __init__(self, frequency: float, damping: float, forces: np.ndarray) -> None:
+        # Imported where it is needed: settings are read by programs that drive nothing.
+        from ..kernels.swing.loaded import oscillator
         w = 2 * math.pi * frequency
+        self._advance = oscillator.drive_oscillators
         self._stiffness, self._damping = w ** 2, 2 * damping * w
         self.z, self.rate = forces / w ** 2, np.zeros(len(forces))
 
     def drive(self, forces: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
         """Values z and z' (t, k) at the ends of steps in which forces (t, k) are constant."""
         z, rate = np.empty((2, *forces.shape))
-        drive_oscillators(self._stiffness, self._damping, step, np.ascontiguousarray(forces),
-                          self.z, self.rate, z, rate)
+        self._advance(self._stiffness, self._damping, step, np.ascontiguousarray(forces), self.z,
+                      self.rate, z, rate)
         return z, rate

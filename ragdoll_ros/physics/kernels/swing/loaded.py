@@ -1,4 +1,5 @@
-"""Imports the kernels of swings, which compiles them, in one process at a time; others load them.
+"""Imports the kernels of swings and of oscillators, which compiles them, in one process at a time;
+others load them.
 
 Where numba does not work they are plain Python.
 """
@@ -12,6 +13,7 @@ else:
     alone = contextlib.nullcontext
 
 with alone():
+    from ..maths import oscillator
     from . import advance_chains, chain_modes
 
-__all__ = ['advance_chains', 'chain_modes']
+__all__ = ['advance_chains', 'chain_modes', 'oscillator']
