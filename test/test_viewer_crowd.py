@@ -60,13 +60,13 @@ def page(recording):
 
 def sent(page, bones):
     """Go to the next instant, and wait for its picture, a message of 28 bytes for each of so many
-    bones and some more.
+    bones; with it may come the first values of the panel, 4 kB.
     """
     client, time = page.clients[0], page.frame.time
     before = len(client.sizes)
     page.source.step()
     wait(lambda: page.frame.time == time + 1 and any(
-        28 * bones <= size < 29 * bones + 2000 for size in client.sizes[before:]))
+        28 * bones <= size < 29 * bones + 8000 for size in client.sizes[before:]))
 
 
 def drawn(page):

@@ -95,9 +95,10 @@ class Editor:
     def select_static(self, body: str | None) -> None:
         """Select a static body in place of all bones; None deselects it."""
         with self._display_lock:
-            self.static = body
-            self.bones = () if body else self.bones
-            self._refresh()
+            if body != self.static:
+                self.static = body
+                self.bones = () if body else self.bones
+                self._refresh()
 
     def toggle(self) -> None:
         """Start editing in the bind pose, or end it and run."""
