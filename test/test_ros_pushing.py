@@ -218,6 +218,15 @@ def test_an_arrow_at_the_edge_points_to_what_is_outside(view, page, heard):
     view.wait(lambda: view.page.evaluate(ARROW) is None)
 
 
+CLICK_BEFORE_IT_IS_DRAWN = """([x, y]) => {
+  const {camera, canvas} = window.__viserMutable;
+  camera.position.z += 0.2;
+  for (const type of ['pointerdown', 'pointerup']) canvas.dispatchEvent(
+    new PointerEvent(type, {clientX: x, clientY: y, isPrimary: true, bubbles: true}));
+}"""
+"""A click as the camera has been moved to the left, seen from +x, and not drawn from there yet."""
+
+
 def test_a_ball_is_thrown_where_one_clicks(view, page, heard):
     """The last test of the node, as the ball stays. A drag of the view throws nothing."""
     poses, _, events = heard
@@ -244,4 +253,7 @@ def test_a_ball_is_thrown_where_one_clicks(view, page, heard):
     view.wait(lambda: len(events_of(events, 'set_state')) == 2)
     # Away, to the left and up, as seen from +x.
     assert (np.sign(events_of(events, 'set_state')[1]['velocity']) == (-1, -1, 1)).all()
+    view.page.evaluate(CLICK_BEFORE_IT_IS_DRAWN, corner)
+    view.wait(lambda: len(events_of(events, 'set_state')) == 3)
+    assert (np.sign(events_of(events, 'set_state')[2]['velocity']) == (-1, -1, 1)).all()
     view.page.get_by_label('Throw a ball by a click').uncheck()

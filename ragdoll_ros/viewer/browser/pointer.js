@@ -20,6 +20,8 @@ function listen(send) {
   };
   const sight = (event) => {
     const {camera, nodeRefFromName: nodes} = window.__viserMutable;
+    // What follows a doll moves the camera between pictures; unproject() would use the last one's.
+    camera.updateMatrixWorld();
     const toWorld = nodes[''].matrixWorld.clone().invert();
     const eye = camera.position.clone().applyMatrix4(toWorld);
     const far = camera.position.clone().set(...place(event), 0.5).unproject(camera);
