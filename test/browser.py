@@ -51,23 +51,6 @@ PLAIN = """() => {
 quality stays. Neither reflections nor shadows: without a GPU, those cost each page that is opened
 8 s of a processor before its first pictures, and two thirds of every further one."""
 
-FEWER_PICTURES = """(() => {
-  const draw = window.requestAnimationFrame.bind(window);
-  let waiting = [], last = -Infinity, count = 0;
-  window.requestAnimationFrame = (callback) => {
-    count += 1;
-    if (waiting.push([count, callback]) === 1) setTimeout(() => draw((time) => {
-      const now = waiting;
-      waiting = [];
-      last = performance.now();
-      for (const [, each] of now) try { each(time); } catch (error) { reportError(error); }
-    }), Math.max(0, last + 100 - performance.now()));
-    return count;
-  };
-  window.cancelAnimationFrame = (id) => { waiting = waiting.filter(([each]) => each !== id); };
-})()"""
-"""Ten pictures a second at the most: without a GPU, sixty take a processor and more."""
-
 BODIES = """() => {
   const {scene, nodeRefFromName: nodes} = window.__viserMutable;
   scene.updateMatrixWorld();
@@ -130,7 +113,6 @@ def chromium():
             profile, executable_path=path, headless=True, args=FLAGS, viewport=SIZE,
             device_scale_factor=SHARPNESS)
         context.set_default_timeout(PATIENCE * 1000)
-        context.add_init_script(FEWER_PICTURES)
         yield context
         context.close()
 
