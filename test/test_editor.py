@@ -33,6 +33,7 @@ from ragdoll_ros.viewer.editor.editor import Editor  # noqa: E402
 from ragdoll_ros.viewer.sources.playback import PlaybackSource  # noqa: E402
 from ragdoll_ros.viewer.sources.simulation import SimulationSource  # noqa: E402
 from ragdoll_ros.viewer.sources.source import RequestedData  # noqa: E402
+from ragdoll_ros.viewer.viser_internals import handle_id  # noqa: E402
 from ragdoll_ros.viewer.widgets.form import AMBER, GREEN, MIXED, RED  # noqa: E402
 
 DROP = load_scene('drop')
@@ -76,6 +77,12 @@ def errors_in(panel):
             for key, said in form.errors.items() if said.visible}
 
 
+def enter(desk, key, text):
+    """Type into a field and press Enter."""
+    desk.panel.body[key].value = text
+    desk.editor._on_enter(handle_id(desk.panel.body[key]))
+
+
 @pytest.fixture
 def desk(server, tmp_path):
     return Desk(server, tmp_path)
@@ -105,6 +112,38 @@ def test_a_mass_and_a_limit_are_edited_saved_loaded_and_undone(desk):
     assert desk.editor.scene == DROP
     desk.editor.redo()
     assert desk.editor.scene == edited
+
+
+@pytest.mark.parametrize(('typed', 'mass', 'friction'), [
+    ([('mass', '3.5'), ('friction', '0.7'), ('restitution', '0.25')], 3.5, 0.7),
+    ([('mass', '3.5'), ('mass', '5'), ('restitution', '0.25')], 5, None),
+    ([('mass', '-1'), ('friction', '0.7'), ('mass', '3.5')], 3.5, 0.7)])
+def test_all_that_is_entered_counts_however_long_a_change_takes(desk, typed, mass, friction):
+    """The second is entered while the first is applied, the third before the second is."""
+    begun, go_on, use = threading.Semaphore(0), threading.Semaphore(0), desk.use
+
+    def use_late(scene):
+        begun.release()
+        assert go_on.acquire(timeout=60)
+        use(scene)
+
+    desk.editor.select('left_shin')
+    desk.use = use_late
+    first_is_refused = typed[0][1].startswith('-')
+    enter(desk, *typed[0])
+    if first_is_refused:
+        wait(lambda: errors_in(desk.panel))
+    else:
+        assert begun.acquire(timeout=60)
+    enter(desk, *typed[1])
+    go_on.release()
+    if not first_is_refused:
+        assert begun.acquire(timeout=60)
+    enter(desk, *typed[2])
+    go_on.release(2)
+    desk.editor._in_order.submit(int).result(60)
+    assert (desk.bone('left_shin').mass, desk.bone('left_shin').friction) == (mass, friction)
+    assert desk.bone('left_shin').restitution == (0.25 if typed[2][0] == 'restitution' else None)
 
 
 def test_a_faulty_value_is_refused_where_it_stands_and_stays(desk):

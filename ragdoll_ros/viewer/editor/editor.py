@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import viser
@@ -48,6 +49,8 @@ class Editor:
         self._display_lock = self._edited.lock
         self._in_order = ThreadPoolExecutor(1)
         """Runs what is entered by keys, one after the other."""
+        self._waiting = 0
+        """Number of forms that were entered and are not applied yet."""
         self._was_paused = False
         self.bones: tuple[str, ...] = ()
         """Names of the selected bones, the last one that was selected at the end."""
@@ -158,10 +161,10 @@ class Editor:
             if self.static:
                 scene = static_bodies.change_body(
                     self.scene, self.static, lambda scene, name: change(scene, name, kind))
-                form.fill(static_bodies.read_body(scene, self.static))
+                form.fill(static_bodies.read_body(scene, self.static), changed=True)
                 return
             name = _existing(self.bone)
-            form.fill(bone_form.read_bone(change(self.scene, name, kind), name))
+            form.fill(bone_form.read_bone(change(self.scene, name, kind), name), changed=True)
 
     def show_handles(self) -> None:
         """Show handles on the selected bone while editing, otherwise none."""
@@ -234,7 +237,9 @@ class Editor:
     def _on_enter(self, field: str) -> None:
         """Apply what the field's form has at this moment: it may be typed further meanwhile."""
         if self.panel.has(field):
-            self._in_order.submit(self._apply, *self._typed())
+            with self._display_lock:
+                self._waiting += 1
+                self._in_order.submit(self._apply_next, *self._typed())
         elif field == handle_id(self.panel.name):
             self._in_order.submit(self.add_bone, self.panel.name.value)
         elif field == handle_id(self.panel.static_name):
@@ -244,6 +249,12 @@ class Editor:
         """The selected bones, the values of the form, and errors of those that cannot be read."""
         with self._display_lock:
             return self.bones, *self.panel.values()
+
+    def _apply_next(self, *typed: Any) -> None:
+        """Apply a form that was entered."""
+        with self._display_lock:
+            self._waiting -= 1
+        self._apply(*typed)
 
     def _apply(self, bones: tuple[str, ...], values: FormValues,
                found: list[errors.ModelError]) -> None:
@@ -313,11 +324,13 @@ class Editor:
         self.panel.show_bones(scene, bones)
         self.panel.show_static(scene, self.static)
         self.panel.show_history(self._edited.history)
+        self.show_handles()
+        if keep_typed and self._waiting:
+            return  # The form has what will be applied next.
         joints = [changes.joint_of(scene, bone) for bone in bones]
         values = bone_form.read_bones(scene, bones) if bones else (
             static_bodies.read_body(scene, self.static) if self.static else {})
         self.panel.show_values(values, [joint.parent for joint in joints if joint], keep_typed)
-        self.show_handles()
 
     @contextmanager
     def _reporting_errors(self) -> Iterator[None]:

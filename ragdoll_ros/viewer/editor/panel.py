@@ -124,7 +124,7 @@ class EditorPanel:
         return self.body.has(widget_id) or self.joint.has(widget_id)
 
     def values(self) -> tuple[FormValues, list[errors.ModelError]]:
-        """Values of the form, and errors of those that cannot be read."""
+        """Changed values of the form, and errors of those that cannot be read."""
         (body, in_body), (joint, in_joint) = self.body.values(), self.joint.values()
         return {**body, **joint}, in_body + in_joint
 

@@ -83,6 +83,8 @@ class Form:
         """Text and exact value that a field was last filled with."""
         self._submitted: dict[str, tuple[str, FieldValue]] = {}
         """Text and value that were last read from a field."""
+        self._changed: set[str] = set()
+        """Keys of fields that have had another value since they were filled."""
         self.errors: dict[str, viser.GuiHtmlHandle] = {}
         """Error texts below the fields; visible if there is an error."""
         self._colors: dict[str, FieldValue] = {}
@@ -107,11 +109,11 @@ class Form:
         """Whether a widget with this id is a field of the form."""
         return any(handle_id(widget) == widget_id for widget in self._widgets.values())
 
-    def fill(self, values: FormValues, keep_typed: bool = False) -> None:
+    def fill(self, values: FormValues, keep_typed: bool = False, changed: bool = False) -> None:
         """Show these fields only, without errors; typed text that has the same value stays.
 
         ``keep_typed``: text that was typed since the values were read stays as well, unless
-        something else has changed the value of its field.
+        something else has changed the value of its field. ``changed``: `values` gives them all.
         """
         self.show_errors(())
         self._color_errors.clear()
@@ -120,9 +122,12 @@ class Form:
                 widget.visible = key in values
                 if key in values:
                     self._fill(key, widget, values[key], keep_typed)
+            self._changed = set(values) if changed else set()
 
     def values(self) -> tuple[FormValues, list[errors.ModelError]]:
-        """Values of the visible fields, and errors of those that cannot be read."""
+        """Values of the visible fields that were changed since they were filled, and errors of
+        those that cannot be read.
+        """
         values: FormValues = {}
         found = []
         with self._lock:
@@ -130,8 +135,12 @@ class Form:
                 text = widget.value
                 if widget.visible and not text == MIXED == self._filled[key][1]:
                     try:
-                        values[key] = self._read(key, text)
-                        self._submitted[key] = text, values[key]
+                        value = self._read(key, text)
+                        self._submitted[key] = text, value
+                        if value != self._filled[key][1]:
+                            self._changed.add(key)
+                        if key in self._changed:
+                            values[key] = value
                     except errors.ModelError as error:
                         found.append(error.at(key))
         return values, found
