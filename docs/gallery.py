@@ -68,7 +68,7 @@ def take_pictures(names: list[str]) -> None:
     browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
     source = SimulationSource(load_scene('flight'))
     source.pause(True)
-    with browser.chromium() as context, served(source) as page:
+    with browser.chromium(draws=True) as context, served(source) as page:
         view = browser.View(context, f'http://127.0.0.1:{page.server.get_port()}')
         for name, (instant, distance, _) in ((name, SCENES[name]) for name in names):
             source.load(name)

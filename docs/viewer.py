@@ -144,7 +144,7 @@ def main(folder: Path) -> None:
     # The tests draw half the pixels, without shadows.
     browser.SHARPNESS, browser.PLAIN = 1, '() => { window.ragdollKeepsQuality = true; }'
     browser.PATIENCE = 100.0
-    with browser.chromium() as context:
+    with browser.chromium(draws=True) as context:
         for picture in (fall, grab, edit, skin, field):
             picture(context, folder)
 

@@ -182,7 +182,7 @@ def main(counts: list[int]) -> None:
     print(f'{"dolls":>6}{"opens, s":>10}{"server, ms":>12}{"kB":>8}{"drawn/s":>10}'
           f'{"undrawn/s":>11}')
     browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
-    with browser.chromium() as context:
+    with browser.chromium(draws=True) as context:
         for dolls in counts:
             cost = measure(context, dolls)
             print(f'{dolls:6}{cost.opening:10.1f}{cost.server:12.2f}{cost.size:8.1f}'

@@ -254,7 +254,7 @@ def test_the_view_is_saved_as_png(view, tmp_path):
     """
     view.hold_at(SCENE, START)
     open_recording(view)
-    with view.page.expect_download() as download:
+    with view.drawing(), view.page.expect_download() as download:
         view.press('Screenshot')
     download.value.save_as(tmp_path / 'view.png')
     picture = iio.imread(tmp_path / 'view.png')

@@ -50,7 +50,7 @@ def seen():
     kept = browser.SHARPNESS, browser.PLAIN
     browser.SHARPNESS, browser.PLAIN = 1, KEEP
     try:
-        with served(SimulationSource(SCENE)) as page, chromium() as context:
+        with served(SimulationSource(SCENE)) as page, chromium(draws=True) as context:
             page.source.pause(True)
             view = View(context, f'http://127.0.0.1:{page.server.get_port()}')
             view.wait(lambda: np.isfinite(view.bodies(SCENE)).all())

@@ -138,7 +138,7 @@ def test_limbs_have_their_colours_on_the_page(run):
     recording, skin = run
     pose = recording.pose(40)
     content = gltf_bytes(recording, {0: skin})
-    with served(PlaybackSource(recording)) as page, chromium() as browser:
+    with served(PlaybackSource(recording)) as page, chromium(draws=True) as browser:
         view = View(browser, f'http://127.0.0.1:{page.server.get_port()}')
         view.page.set_viewport_size({'width': 1280, 'height': 800})
         view.wait(lambda: page.timeline.clip is not None)
@@ -172,7 +172,7 @@ def test_limbs_have_their_colours_on_the_page(run):
 def test_a_page_without_a_server_has_them_too(run, tmp_path):
     recording, _ = run
     path = save_static(recording, tmp_path)
-    with chromium() as browser:
+    with chromium(draws=True) as browser:
         view = View(browser, path.as_uri())
         view.wait(lambda: view.page.evaluate(PAINTED))
         assert not view.errors

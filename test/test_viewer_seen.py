@@ -69,7 +69,7 @@ def scenes(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def seen(scenes):
-    with served(SimulationSource(scenes['drop'])) as page, chromium() as browser:
+    with served(SimulationSource(scenes['drop'])) as page, chromium(draws=True) as browser:
         view = View(browser, f'http://127.0.0.1:{page.server.get_port()}', SIZE)
         view.wait(lambda: page.editor is not None)
         yield Seen(page, view)
