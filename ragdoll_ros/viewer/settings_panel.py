@@ -88,13 +88,14 @@ class SettingsPanel:
                 None, self._try, lambda name=event.target.value: self.source.set_accuracy(name))
 
     def _apply(self) -> None:
-        """Restart with the values of the fields, or show errors below them."""
+        """Restart with the fields' changed values, or show errors below them."""
         values, found = self.form.values()
         scene = self._scene
         if scene is None:
             return
         try:
-            values['friction'] = parsing.parse_number(values['friction'], infinite=True)
+            if 'friction' in values:
+                values['friction'] = parsing.parse_number(values['friction'], infinite=True)
         except errors.ModelError as error:
             del values['friction']
             found.append(error.at('friction'))
