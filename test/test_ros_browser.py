@@ -48,10 +48,9 @@ def view(browser, listener, heard):
 
     The listener hears both from here on: that takes seconds where the machine is busy.
     """
-    with serving(module='ragdoll_ros.ros.run') as url, opened(browser, url, SCENE) as view:
+    with (serving(module='ragdoll_ros.ros.run') as url,
+          opened(browser, url, SCENE, first=True) as view):
         view.wait(lambda: all(topic.get_publisher_count() for topic in listener.subscriptions))
-        # The first fall begins once the page has drawn its start, which may take a while.
-        view.button('Pause').wait_for()
         yield view
 
 
