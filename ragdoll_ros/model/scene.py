@@ -280,6 +280,14 @@ class Scene:
         bodies = f', {len(self.bodies)} static bodies' if self.bodies else ''
         return f'Scene {self.name!r}: {dolls}; {ground}{bodies}, tick {self.step:g} s'
 
+    def touched_name(self, bone: int, body: int) -> str:
+        """Name of what is touched: a bone, a static body, or 'ground'; the index of what it is not
+        is negative.
+        """
+        if bone >= 0:
+            return self.bone_names[bone]
+        return self.bodies[body].name if body >= 0 else 'ground'
+
     def qualified(self, placement: Placement, name: str) -> str:
         """Name of a doll's bone or angle in the scene: prefixed where there are several dolls."""
         return name if len(self.dolls) == 1 else f'{placement.name}/{name}'

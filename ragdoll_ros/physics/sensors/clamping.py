@@ -15,7 +15,6 @@ import numpy as np
 from ...model.biomechanical_limits import BiomechanicalLimits
 from ...model.scene import SECOND, Scene
 from ..engine.protocol import Contacts
-from .impacts import touched_name
 
 LASTING = SECOND // 2
 """ns from which on a contact is quasi-static."""
@@ -87,7 +86,7 @@ class ClampingMonitor:
         times, forces = np.array(samples).T
         region = self._limits.regions.get(self._regions[bone])
         return Clamping(scene.dolls[scene.doll_of_bone[bone]].name, scene.bone_names[bone],
-                        self._regions[bone], touched_name(scene, other, body),
+                        self._regions[bone], scene.touched_name(other, body),
                         float(np.average(forces[1:], weights=np.diff(times))),
                         region.force if region else math.nan)
 

@@ -1,4 +1,4 @@
-"""Impacts of bones in figures: what met, and the force that a stated contact law gives.
+"""Impacts of bones: what met, its speed and impulse, and the force that a stated contact law gives.
 
 Bodies are rigid: an impact has a speed of approach v, an impulse and an effective mass mu, and no
 force. The contact law is a linear spring k of the body's region between them (ISO/TS 15066, annex
@@ -19,8 +19,6 @@ from ...model.scene import SECOND, Scene
 from ...model.vectors import Vector
 from ..engine.protocol import Impacts
 from .head_injury import half_sine_head_injury
-
-GROUND_NAME = 'ground'
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,7 @@ class ImpactRecorder:
         return Impact(
             begin + round(found.elapsed[row] * SECOND),
             scene.dolls[scene.doll_of_bone[bone]].name, scene.bone_names[bone],
-            self._regions[bone], touched_name(scene, other, int(found.bodies[row])),
+            self._regions[bone], scene.touched_name(other, int(found.bodies[row])),
             _vector(found.positions[row]), _vector(sign * found.normals[row]),
             float(found.speeds[row]), float(found.effective_masses[row]),
             float(found.impulses[row]), float(found.mobilities[row, 0 if sign > 0 else 1]),
@@ -121,15 +119,6 @@ class ImpactRecorder:
     def _region(self, bone: int) -> BodyRegion | None:
         """The region of a bone; None if there is none, or no bone."""
         return self.limits.regions.get(self._regions[bone]) if bone >= 0 else None
-
-
-def touched_name(scene: Scene, bone: int, body: int) -> str:
-    """Name of what is touched: a bone, a static body or the ground, whose indices are GROUND for
-    those that it is not.
-    """
-    if bone >= 0:
-        return scene.bone_names[bone]
-    return scene.bodies[body].name if body >= 0 else GROUND_NAME
 
 
 def _vector(row: np.ndarray) -> Vector:

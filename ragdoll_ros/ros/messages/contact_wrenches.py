@@ -18,12 +18,8 @@ SEPARATOR = '//'
 
 def contact_names(scene: Scene, contacts: Contacts) -> list[str]:
     """Names (c,) of what touches: bone//bone, bone//body or bone//ground."""
-    names = []
-    for a, b, body in zip(contacts.a, contacts.b, contacts.bodies, strict=True):
-        other = (scene.bone_names[b] if b >= 0 else
-                 scene.bodies[body].name if body >= 0 else 'ground')
-        names.append(scene.bone_names[a] + SEPARATOR + other)
-    return names
+    return [scene.bone_names[a] + SEPARATOR + scene.touched_name(b, body)
+            for a, b, body in zip(contacts.a, contacts.b, contacts.bodies, strict=True)]
 
 
 def to_contact_wrenches(frame: str, scene: Scene, stamp: int,

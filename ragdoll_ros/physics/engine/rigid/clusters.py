@@ -221,7 +221,7 @@ class Clusters:
         cluster.state.dense_step[:] = 0
 
     def follow_twist(self, doll: int) -> None:
-        """Let what a doll touches follow its new twist when its cluster is advanced."""
+        """Mark that the twist of a doll was set: its contacts take the new one."""
         self.members[self.of_doll[doll]].state.stats['twist_changed'] = 1
 
     def set_doll(self, doll: int, q: np.ndarray, v: np.ndarray) -> None:

@@ -36,14 +36,9 @@ def find_overlaps(scene: Scene, clusters: Clusters, broad_phase: BroadPhase, lay
         for pair, depth in _depths(scene, clusters, broad_phase, straight).items():
             if _is_within_doll(scene, pair) and found.get(pair, 0.0) < depth + TOLERANCE:
                 found.pop(pair, None)
-    return tuple(Overlap(scene.bone_names[bone], _name(scene, other), depth)
+    return tuple(Overlap(scene.bone_names[bone],
+                         scene.touched_name(other, FIRST_BODY - other), depth)
                  for (bone, other), depth in sorted(found.items(), key=lambda item: -item[1]))
-
-
-def _name(scene: Scene, other: int) -> str:
-    if other == GROUND:
-        return 'ground'
-    return scene.bone_names[other] if other >= 0 else scene.bodies[FIRST_BODY - other].name
 
 
 def _is_within_doll(scene: Scene, pair: Pair) -> bool:
