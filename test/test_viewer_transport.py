@@ -142,10 +142,11 @@ def test_a_second_page_shows_the_same(browser, page, view):
 def test_a_typed_time_is_that_of_the_shown_run(page, view):
     """Simulated time, though the timeline began before a reset."""
     view.wait(lambda: page.source.frame.time > 0.5)
+    run = page.source.frame.run
     view.key('r')
-    # The page may still draw the run before.
-    view.wait(lambda: page.timeline.clip.resets.any() and page.frame.time > 0.5
-              and page.frame.run == page.source.frame.run)
+    # The key may still be on its way, and the page may still draw the run before.
+    view.wait(lambda: page.source.frame.run != run and page.timeline.clip.resets.any()
+              and page.frame.time > 0.5 and page.frame.run == page.source.frame.run)
     field = view.page.get_by_label('Time', exact=True)
     field.click()
     view.key('Control+a')
