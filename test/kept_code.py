@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numba
 from conftest import ROOT
-from numba.core import serialize
 
-from ragdoll_ros.physics.kernels.compiling.cache import KEY, KernelCache, _keep
+from ragdoll_ros.physics.kernels.compiling.cache import KEY, KernelCache, _keep, machine_code
 
 FOLDER = ROOT / '.pytest_cache' / 'machine_code'
 
@@ -35,7 +34,7 @@ class KeptCode(KernelCache):
     def save_overload(self, sig, data):
         if not data.library.has_dynamic_globals:
             with contextlib.suppress(OSError):
-                _keep(self._path_for(sig), serialize.dumps(data._reduce()))
+                _keep(self._path_for(sig), machine_code(data._reduce()))
 
 
 def kept(function):

@@ -7,6 +7,7 @@ without a folder to write to, all is compiled at every start.
 from __future__ import annotations
 
 import contextlib
+import functools
 import gc
 import hashlib
 import os
@@ -21,8 +22,10 @@ from typing import ClassVar
 
 import numba
 import numpy as np
+from llvmlite import binding
 from numba.core import caching, compiler, event, registry, serialize
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime import rtsys
 from numba.misc.appdirs import AppDirs
 
 from . import notices
@@ -100,19 +103,26 @@ class KernelCache(caching._Cache):
         return str(FOLDER)
 
     def load_overload(self, sig: tuple, target_context: object) -> compiler.CompileResult | None:
-        """The compiled function from the cache; None if it is missing or damaged."""
-        target_context.refresh()
+        """The compiled function from the cache; None if it is missing or damaged.
+
+        Only the runtime of arrays is set up first. Numba's own cache sets up all that it compiles
+        with, and SciPy, which takes twice as long as the rest; the compiler does so when it begins.
+        """
+        rtsys.initialize(target_context)
         try:
-            kept = pickle.loads(self._path.read_bytes())
-            return compiler.CompileResult._rebuild(target_context, *kept)
+            kept, called_code = pickle.loads(self._path.read_bytes())
+            loaded = compiler.CompileResult._rebuild(target_context, *kept)
         except Exception:  # a pickle that was damaged may raise anything
             return None
+        loaded.library._get_module_for_linking = functools.partial(
+            binding.parse_bitcode, called_code)
+        return loaded
 
     def save_overload(self, sig: tuple, data: compiler.CompileResult) -> None:
         """Save the compiled function, unless it contains addresses of this process."""
         if KernelCache.failure is None and not data.library.has_dynamic_globals:
             try:
-                _keep(self._path, serialize.dumps(data._reduce()))
+                _keep(self._path, machine_code(data._reduce()))
             except OSError as error:
                 KernelCache.failure = error
                 notices.say(notices.NOT_KEPT.format(error))
@@ -125,6 +135,23 @@ class KernelCache(caching._Cache):
 
     def flush(self) -> None:
         """See enable."""
+
+
+def machine_code(kept: tuple) -> bytes:
+    """What numba keeps of a compiled function, as it is loaded fastest.
+
+    Two things take numba most of the time. It reads the LLVM IR, which compiled callers link in,
+    for the names that it defines: here it reads IR of the one name that it looks up, and the whole
+    only for a caller. It imports the module of each function that was linked in, SciPy for one,
+    with that function's environment: here those without constants, which nothing reads, are left
+    out.
+    """
+    (name, kind, (code, called_code)), described, *rest, environments = kept
+    entry = binding.parse_assembly(
+        f'define void @"{described.llvm_cpython_wrapper_name}"() {{ ret void }}')
+    short = ((name, kind, (code, entry.as_bitcode())), described, *rest,
+             tuple(environment for environment in environments if environment.consts))
+    return serialize.dumps((short, called_code))
 
 
 def _keep(path: Path, content: bytes) -> None:
