@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 pytest.importorskip('numba')
@@ -38,6 +37,23 @@ def _collide(a, b, margin, out):
 @kept
 def _separation(a, b):
     return separation(a, b, math.inf)
+
+
+@kept
+def _way_to_gap(a, b, direction, wanted):
+    """How far, m, below 2, body a goes in a direction until its gap is wanted: to the last bit."""
+    near, far = 0.0, 2.0
+    while True:
+        way = (near + far) / 2
+        if way in (near, far):
+            return way
+        x, y, z = a.position
+        moved = Shape(a.kind, a.size, (x + way * direction[0], y + way * direction[1],
+                                       z + way * direction[2]), a.rotation)
+        if separation(moved, b, math.inf) < wanted:
+            near = way
+        else:
+            far = way
 
 
 class Body:
@@ -99,8 +115,8 @@ def touching(rng, kind_a, kind_b, wanted=0.0):
     a, b = any_body(rng, kind_a, .03), any_body(rng, kind_b)
     way = rng.normal(size=3)
     way /= np.linalg.norm(way)
-    far = brentq(lambda t: gap(a.moved(way * t), b) - wanted, 0, 2, xtol=1e-15, rtol=1e-15)
-    return a.moved(way * far), b
+    assert gap(a, b) < wanted < gap(a.moved(2 * way), b)
+    return a.moved(way * _way_to_gap(a.shape, b.shape, way, wanted)), b
 
 
 def places(found):
