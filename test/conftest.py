@@ -28,13 +28,15 @@ collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
                        if importlib.util.find_spec(package) is None for file in files]
 
 
-LONGEST = ('test_falls_run.py', 'test_ros_viewer.py', 'test_collision.py', 'test_viewer_browser.py',
-           'test_planar_rods.py', 'test_ros_teleop.py', 'test_swing.py', 'test_viewer_walks.py',
-           'test_fit_split_characters.py', 'test_ros_stamps.py', 'test_package.py',
-           'test_viewer_typed.py', 'test_viewer_editing.py', 'test_fit_wild.py',
-           'test_viewer_crowd.py', 'test_editor.py',
+LONGEST = ('test_falls_run.py', 'test_ros_teleop.py', 'test_viewer_browser.py',
+           'test_viewer_look.py', 'test_ros_stamps.py', 'test_planar_rods.py',
+           'test_ros_viewer.py', 'test_ros_programs.py', 'test_sliding_patches.py',
+           'test_viewer_seen.py', 'test_ros_process.py', 'test_collision.py',
+           'test_viewer_walks.py', 'test_swing.py', 'test_fit_split_characters.py',
+           'test_package.py', 'test_viewer_typed.py', 'test_viewer_editing.py',
+           'test_fit_wild.py', 'test_viewer_crowd.py', 'test_editor.py',
            'test_viewer_amiss.py', 'test_fit_rigs.py', 'test_ros_browser.py', 'test_guard.py',
-           'test_ros_programs.py', 'test_fit_wrists.py', 'test_ros_process.py', 'test_contact.py',
+           'test_fit_wrists.py', 'test_contact.py',
            'test_viewer_paint.py', 'test_dynamics.py', 'test_tutorial.py', 'test_grab.py',
            'test_viewer_command.py', 'test_drive.py', 'test_ros_parameters.py', 'test_report.py',
            'test_ros_inputs.py', 'test_clusters.py', 'test_without_numba.py', 'test_fit_saved.py',
