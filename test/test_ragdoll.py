@@ -1,6 +1,7 @@
 """What a doll may be, and the named error for all that it may not be."""
 import dataclasses
 import math
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -144,3 +145,12 @@ def test_what_hangs_on_bones_is_renamed_with_them():
                                  (*renamed.riders, *renamed.swings), strict=True):
             assert after == dataclasses.replace(before, bone=f'a_{before.bone}')
         scene_to_urdf(Scene('two', (Placement(each, 'a'), Placement(each, 'b'))))
+
+
+def test_joints_of_several_dolls_have_the_names_of_the_scene_s_angles():
+    """Those, too, that have names of their own, as persons' have: a URDF's joints are unique."""
+    scene = Scene('two', (Placement(load_doll('man'), 'a'), Placement(load_doll('woman'), 'b')))
+    joints = ElementTree.fromstring(scene_to_urdf(scene)).findall('joint')
+    names = [joint.get('name') for joint in joints
+             if joint.get('type') not in ('floating', 'fixed')]
+    assert sorted(names) == sorted(scene.angle_names)

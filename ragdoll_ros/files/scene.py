@@ -2,10 +2,13 @@
 import functools
 import math
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..model.errors import ModelError, OutOfRange
+from ..model.per_doll import PerDoll
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
@@ -122,12 +125,14 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
     return scene, found
 
 
-def scene_data(scene: Scene, folder: Path | None = None) -> dict:
+def scene_data(scene: Scene, folder: Path | None = None,
+               data_of: Callable[[Ragdoll], object] | None = None) -> dict:
     """A scene as lists and numbers in the form of scene.schema.json; see doll_data.
 
-    Placements that share a doll share its data, which YAML writes once.
+    Placements that share a doll share its data, which YAML writes once. ``data_of``: what to write
+    for a doll instead of that data.
     """
-    dolls: dict[int, dict] = {}
+    dolls: PerDoll[Any] = PerDoll(data_of or partial(doll_data, folder=folder))
     data: dict[str, Any] = {
         'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
         'pace': scene.pace, 'self_collision': scene.self_collision,
@@ -137,9 +142,7 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
     if scene.ground is not None:
         data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
     for placement in scene.dolls:
-        if id(placement.doll) not in dolls:
-            dolls[id(placement.doll)] = doll_data(placement.doll, folder)
-        entry = {'doll': dolls[id(placement.doll)], 'name': placement.name}
+        entry = {'doll': dolls[placement.doll], 'name': placement.name}
         for key in ('position', 'orientation', 'velocity', 'spin'):
             entry[key] = list(getattr(placement, key))
         for name, key in ANGLE_KEYS.items():

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..model import rotation
+from ..model.per_doll import PerDoll
 from ..model.pose import Pose
 from ..model.ragdoll import DEFAULT_COLOR, WORLD, Bone, Joint, Ragdoll, joint_frame
 from ..model.scene import Scene
@@ -38,20 +39,24 @@ def to_urdf(doll: Ragdoll, dialect: str = 'ros') -> str:
     return _document(doll.name, _tree(doll, dialect))
 
 
-def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
-    """All dolls of a scene as one URDF in ROS's dialect, with the scene's bone names.
+def urdf_tree(doll: Ragdoll) -> str:
+    """Links and joints of a doll in ROS's dialect, DOLL_NAME before each name."""
+    return '\n'.join(_tree(doll.renamed(DOLL_NAME.__add__), 'ros'))
+
+
+def scene_to_urdf(scene: Scene, frame: str = WORLD, trees: PerDoll[str] | None = None) -> str:
+    """All dolls of a scene as one URDF in ROS's dialect, with the scene's names.
 
     Several dolls are connected by floating joints to a link named ``frame``, each at its root's
-    initial pose.
+    initial pose. ``trees``: of urdf_tree, kept from scene to scene.
     """
+    trees = trees or PerDoll(urdf_tree)
     if len(scene.dolls) == 1:
-        return to_urdf(scene.dolls[0].doll)
-    lines, trees = [f'  <link name={_quoted(frame)}/>'], {}
+        doll = scene.dolls[0].doll
+        return _document(doll.name, [trees[doll].replace(DOLL_NAME, '')])
+    lines = [f'  <link name={_quoted(frame)}/>']
     for placement in scene.dolls:
-        doll = placement.doll
-        if id(doll) not in trees:
-            trees[id(doll)] = doll.root, '\n'.join(_tree(doll.renamed(DOLL_NAME.__add__), 'ros'))
-        root, tree = trees[id(doll)]
+        root, tree = placement.doll.root, trees[placement.doll]
         name = _quoted(scene.qualified(placement, root.name))
         position, _ = placement.bone_pose(root)
         lines += [f'  <joint name={name} type="floating">',

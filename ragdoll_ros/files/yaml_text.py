@@ -147,6 +147,10 @@ def to_text(data: dict, schema: str, head: str) -> str:
     lines = [f'# yaml-language-server: $schema={schema}.schema.json',
              '# Units: m, kg, s, degrees where a key ends in _deg. x forward, y left, z up.']
     lines += ['# ' + line if line else '#' for line in head.splitlines()]
-    text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, width=100, allow_unicode=True,
+    return '\n'.join(lines) + '\n' + dump(data)
+
+
+def dump(data: dict) -> str:
+    """YAML text of data."""
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, width=100, allow_unicode=True,
                      default_flow_style=None)
-    return '\n'.join(lines) + '\n' + text

@@ -146,15 +146,18 @@ class DofLayout:
         return table[:, :1] + np.arange(4), table[:, 1:] + np.arange(3)
 
 
-def placed_coordinates(placements: Sequence[Placement]) -> GeneralizedState:
-    """Coordinates and velocities of dolls as they are placed: where a simulation starts."""
-    layout = DofLayout([placement.doll for placement in placements])
+def placed_coordinates(placements: Sequence[Placement],
+                       layout: DofLayout | None = None) -> GeneralizedState:
+    """Coordinates and velocities of dolls as they are placed: where a simulation starts.
+    ``layout``: that of the dolls, if there is one already.
+    """
+    layout = layout or DofLayout([placement.doll for placement in placements])
     q, v = np.zeros(layout.sizes[0]), np.zeros(layout.sizes[1])
     for index, placement in enumerate(placements):
-        pose = placement.bone_pose(placement.doll.root)
+        pose, velocity = placement.root_motion
         q[layout.root_positions[index]] = pose.position
         q[layout.root_orientations[index]] = pose.orientation
-        v[layout.root_velocities[index]] = placement.root_velocity()
+        v[layout.root_velocities[index]] = velocity
         v[layout.root_angular_velocities[index]] = placement.spin
     angles, rates = (np.array([
         getattr(placement, key).get(name, 0.0) for placement in placements

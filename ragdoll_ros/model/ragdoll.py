@@ -377,10 +377,11 @@ class Ragdoll:
         return dataclasses.replace(self, bones=bones)
 
     def renamed(self, rename: Callable[[str], str]) -> Ragdoll:
-        """A copy with every bone renamed."""
+        """A copy with every bone renamed, and every angle that has a name of its own."""
         bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
-        joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
-                                           child=rename(joint.child)) for joint in self.joints)
+        joints = tuple(dataclasses.replace(
+            joint, parent=rename(joint.parent), child=rename(joint.child),
+            names=tuple(map(rename, joint.names))) for joint in self.joints)
         pairs = tuple((rename(first), rename(second)) for first, second in self.no_collision)
         swings = tuple(dataclasses.replace(swing, bone=rename(swing.bone))
                        for swing in self.swings)

@@ -158,6 +158,11 @@ class Placement:
         """Initial centre of mass (3,) m, doll's frame."""
         return self._mean('position') if self.angles else self.doll.mass_centre
 
+    @cached_property
+    def root_motion(self) -> tuple[Pose, np.ndarray]:
+        """Initial pose of the root, and velocity (3,) m/s of its centre of mass, world frame."""
+        return self.bone_pose(self.doll.root), self.root_velocity()
+
     def root_velocity(self) -> np.ndarray:
         """Initial velocity (3,) m/s of the root's centre of mass, world frame."""
         arm = rotation.rotate(self.orientation, self.doll.root.position - self.mass_centre)
@@ -292,11 +297,15 @@ class Scene:
         """Name of a doll's bone or angle in the scene: prefixed where there are several dolls."""
         return name if len(self.dolls) == 1 else f'{placement.name}/{name}'
 
+    @cached_property
+    def _bone_indices(self) -> dict[str, int]:
+        return {name: index for index, name in enumerate(self.bone_names)}
+
     def bone_index(self, name: str) -> int:
         """Index of a bone in all arrays. Raises UnknownBone."""
         try:
-            return self.bone_names.index(name)
-        except ValueError:
+            return self._bone_indices[name]
+        except KeyError:
             raise errors.UnknownBone('', name, errors.one_of(self.bone_names, name)) from None
 
 

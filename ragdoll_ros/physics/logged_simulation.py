@@ -114,7 +114,8 @@ class LoggedSimulation(Simulation):
 
     def add(self, placement: Placement) -> State:
         state = super().add(placement)
-        self.on_event('add', {'placement': placement})
+        # That of the scene: its doll may be one that others share.
+        self.on_event('add', {'placement': self.scene.dolls[-1]})
         return state
 
     def remove(self, doll: str) -> State:

@@ -23,7 +23,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from ..files.run_scene import placement_text, run_scene_text, scene_digest
+from ..files.run_scene import doll_text, placement_text, run_scene_text, scene_digest
+from ..model.per_doll import PerDoll
 from ..model.scene import Scene
 from ..physics.logged_simulation import LoggedSimulation, state_digest
 from .latched_topic import LATCHED
@@ -43,12 +44,15 @@ class EventLog:
         self._scenes = node.create_publisher(String, '~/scene', LATCHED)
         self._scene: Scene | None = None
         self._simulation: LoggedSimulation | None = None
+        self._texts = PerDoll(doll_text)
         self._number = self._tick = 0
 
     def set_simulation(self, simulation: LoggedSimulation) -> None:
         """Log this simulation from now on, and publish its scene if that is another one."""
         if simulation.scene is not self._scene:
-            self._scene, text = simulation.scene, run_scene_text(simulation.scene)
+            self._scene = simulation.scene
+            self._texts.keep(placement.doll for placement in self._scene.dolls)
+            text = run_scene_text(self._scene, self._texts)
             self._digest = scene_digest(text)
             self._scenes.publish(String(data=text))
         if simulation is self._simulation:
@@ -61,7 +65,7 @@ class EventLog:
         if kind in ('start', 'reset'):
             fields = {'scene': self._digest, **fields}
         elif kind == 'add':
-            fields = {'placement': placement_text(fields['placement'])}
+            fields = {'placement': placement_text(fields['placement'], self._texts)}
         event = {'number': self._number, 'tick': self._tick, 'kind': kind, **fields}
         self._number += 1
         self._events.publish(String(data=json.dumps(event)))

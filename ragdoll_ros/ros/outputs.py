@@ -14,7 +14,8 @@ from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from ..files.urdf import scene_to_urdf
+from ..files.urdf import scene_to_urdf, urdf_tree
+from ..model.per_doll import PerDoll
 from ..model.scene import Scene
 from .humans.publishers import Humans
 from .latched_topic import LATCHED, LATCHED_HISTORY, LatchedTopic, overridable_publisher
@@ -47,6 +48,7 @@ class Outputs:
         self._contacts = overridable_publisher(node, PoseArray, '~/contacts', 10)
         self._wrenches = overridable_publisher(node, MultiDOFJointState, '~/contact_wrenches', 10)
         self._markers = LatchedTopic(node, MarkerArray, '~/markers')
+        self._urdf_trees = PerDoll(urdf_tree)
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._tf = TfPublisher(node)
         self.humans = Humans(node)
@@ -61,7 +63,8 @@ class Outputs:
         """What has not published the last tick, for want of subscribers."""
         self._tf.set_scene(scene, frame, publish_tf)
         self.humans.set_scene(scene, frame, publish_tf)
-        description = scene_to_urdf(scene, frame)
+        self._urdf_trees.keep(placement.doll for placement in scene.dolls)
+        description = scene_to_urdf(scene, frame, self._urdf_trees)
         self._urdf = checksum(description)
         self._description.publish(String(data=description))
 

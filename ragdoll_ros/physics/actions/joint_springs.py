@@ -4,6 +4,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,12 +31,7 @@ class JointSprings:
     """The active joint springs of a scene, at most one for each angle."""
 
     def __init__(self, scene: Scene) -> None:
-        self._names = scene.angle_names
-        self._axes = [None if joint.is_free_ball else (
-            scene.bone_index(scene.qualified(placement, joint.child)), axis)
-            for placement in scene.dolls for joint in placement.doll.joints
-            for axis in range(joint.dof)]
-        """Child bone and axis index of each angle; None for a ball joint without angles."""
+        self._scene, self._names = scene, scene.angle_names
         self._applied: dict[str, AppliedJointSpring] = {}
 
     @property
@@ -64,7 +60,7 @@ class JointSprings:
 
     def changed(self, change: SceneChange) -> JointSprings:
         """Those on dolls that stay, in the scene after."""
-        after, names = JointSprings(change.after), change.angle_names
+        after, names = JointSprings(change.after), change.angle_names if self._applied else {}
         after._applied = {
             names[angle]: dataclasses.replace(spring, bone=int(change.new_bones[spring.bone]))
             for angle, spring in self._applied.items() if angle in names}
@@ -75,6 +71,15 @@ class JointSprings:
         for angle in self._names if angles is None else angles:
             self._index(angle)
             self._applied.pop(angle, None)
+
+    @cached_property
+    def _axes(self) -> list[tuple[int, int] | None]:
+        """Child bone and axis index of each angle; None for a ball joint without angles."""
+        scene = self._scene
+        return [None if joint.is_free_ball else (
+            scene.bone_index(scene.qualified(placement, joint.child)), axis)
+            for placement in scene.dolls for joint in placement.doll.joints
+            for axis in range(joint.dof)]
 
     def _index(self, angle: str) -> int:
         if angle not in self._names:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...files.urdf import to_urdf
+from ...model.per_doll import PerDoll
 from ...model.pose import Pose
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Scene
@@ -18,6 +19,9 @@ JOINTS = frozenset((
     *(f'{side}_{name}' for side in 'lr' for name in (
         'y_shoulder', 'p_shoulder', 'r_shoulder', 'elbow', 'y_hip', 'p_hip', 'r_hip', 'knee'))))
 """The draft's names of joints: a doll that has them all is a person, as ragdoll_person makes."""
+
+ANY_ID = '\0'
+"""Placeholder for the id in a URDF that equal dolls share; not allowed in XML."""
 
 
 @dataclass(frozen=True)
@@ -38,20 +42,23 @@ class Body:
         return f'body_{self.id}'
 
 
-def bodies(scene: Scene, most: int) -> list[Body]:
-    """The first persons of a scene, at most so many."""
+def bodies(scene: Scene, most: int, urdfs: PerDoll[str] | None = None) -> list[Body]:
+    """The first persons of a scene, at most so many. ``urdfs``: of body_urdf, kept from scene to
+    scene.
+    """
     found, ids, first = [], set(), 0
+    urdfs = urdfs or PerDoll(body_urdf)
     for placement in scene.dolls:
         doll = placement.doll
         names = [name for joint in doll.joints for name in joint.angle_names]
         if set(names) >= JOINTS and len(found) < most:
             body_id = _id(placement.name, ids)
             ids.add(body_id)
-            hips = _mid_hips(doll)
             found.append(Body(
                 body_id, scene.bone_index(scene.qualified(placement, doll.root.name)),
                 np.arange(first, first + len(names)), tuple(f'{name}_{body_id}' for name in names),
-                doll.root.pose.relative(hips), _urdf(doll, body_id, hips)))
+                doll.root.pose.relative(_mid_hips(doll)),
+                urdfs[doll].replace(ANY_ID, body_id)))
         first += len(names)
     return found
 
@@ -70,9 +77,9 @@ def _mid_hips(doll: Ragdoll) -> Pose:
                          if {'l_p_hip', 'r_p_hip'} & set(joint.angle_names)], axis=0))
 
 
-def _urdf(doll: Ragdoll, body_id: str, hips: Pose) -> str:
-    """The doll's URDF below a link body_<id>, all names with the suffix _<id>."""
-    ending = f'_{body_id}'
+def body_urdf(doll: Ragdoll) -> str:
+    """The doll's URDF below a link body_<id>, all names with the suffix _<id>; ANY_ID for <id>."""
+    ending, hips = f'_{ANY_ID}', _mid_hips(doll)
     renamed = doll.renamed(lambda name: name + ending)
     joints = tuple(
         dataclasses.replace(joint, names=tuple(name + ending for name in old.angle_names))

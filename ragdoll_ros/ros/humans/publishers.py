@@ -10,12 +10,13 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from ...model.per_doll import PerDoll
 from ...model.scene import Scene
 from ..latched_topic import LATCHED
 from ..messages.convert import to_header, to_joint_state
 from ..messages.serialized import SerializedTemplate
 from ..messages.tf import DEPTH, TFMessage, to_tf
-from .body import Body, bodies
+from .body import Body, bodies, body_urdf
 
 if TYPE_CHECKING:
     from ...physics.simulation import Simulation
@@ -44,6 +45,7 @@ class Humans:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._bodies: list[BodyPublishers] = []
+        self._urdfs = PerDoll(body_urdf)
         self._tracked: Publisher | None = None
         self._tf: Publisher | None = None
         self.status = ''
@@ -51,8 +53,10 @@ class Humans:
 
     def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
         """Publish the URDFs of a scene's persons; ``frame`` names the world frame."""
+        self._urdfs.keep(placement.doll for placement in scene.dolls)
         # One is enough to say that it is not published.
-        self._frame, found = frame, bodies(scene, 1 if IdsList is None else MAX_BODIES)
+        self._frame, found = frame, bodies(scene, 1 if IdsList is None else MAX_BODIES,
+                                           self._urdfs)
         self._destroy()
         self.status = ', '.join(body.id for body in found)
         if found and IdsList is None:

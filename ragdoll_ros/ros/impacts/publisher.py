@@ -24,6 +24,7 @@ class ImpactPublisher:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher = node.create_publisher(DiagnosticArray, '~/impacts', DEPTH)
+        self._limits_name = ''
         self._recorded: Simulation | None = None
         """The simulation whose impacts are recorded."""
         self._refused: Simulation | None = None
@@ -34,7 +35,10 @@ class ImpactPublisher:
 
     def configure(self, settings: NodeSettings) -> None:
         """Take frame and limits of these settings."""
-        self._frame, self._limits = settings.frame_id, load_limits(settings.impact_limits)
+        self._frame = settings.frame_id
+        if settings.impact_limits != self._limits_name:
+            self._limits_name = settings.impact_limits
+            self._limits = load_limits(self._limits_name)
         self.stop()
 
     def stop(self) -> None:

@@ -129,8 +129,9 @@ class Parameters:
             scene = self._load(given['scene']) if 'scene' in given else self.scene
             settings = dataclasses.replace(self.settings,
                                            **{**self._new_scene_defaults(scene), **given})
-            check(settings, scene)
             changed = self._changed(given, settings)
+            if changed:  # what has been checked need not be again, as dolls come and go
+                check(settings, scene)
             self._prepare(changed, settings, scene)
         except RagdollError as error:
             return SetParametersResult(successful=False, reason=str(error))
