@@ -311,5 +311,5 @@ def test_a_scene_without_driven_bodies_says_so():
 @pytest.mark.parametrize('engine', ['bullet', 'mujoco'])
 def test_other_engines_refuse_driven_bodies(engine):
     pytest.importorskip(engine.replace('bullet', 'pybullet'))
-    with pytest.raises(RagdollError, match='rigid, for bodies with follow'):
+    with pytest.raises(RagdollError, match='rigid, which moves bodies with follow'):
         Simulation(scene(body('robot', Box((0.4, 0.4, 0.4)), follow=EXACT)), engine=engine)

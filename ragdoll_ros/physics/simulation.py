@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, cast
 
@@ -24,8 +24,9 @@ from .actions.driven_bodies import DrivenBodies
 from .actions.grab import DRAG_TIME, Grab, Hands, checked_point
 from .actions.joint_springs import JointSpring, JointSprings
 from .actions.push_queue import PushQueue
+from .engine.capabilities import Capability, require
 from .engine.protocol import Contacts, Drives, Engine, Overlap, Springs, Wrenches
-from .engine.registry import EngineChoice, resolve_engine
+from .engine.registry import resolve_engine
 from .rigid_body import GroundHeights, JointGap
 from .sensors.impacts import Impact, ImpactRecorder
 from .sleeping import SleepDetector
@@ -64,7 +65,7 @@ class Simulation:
     Raises:
         OutOfRange: step, accuracy, engine or workers is not valid.
         MissingEngine: the engine's library is not installed or does not work.
-        WrongForm: a joint has passive torques, and the engine is not rigid.
+        WrongForm: a joint has passive torques, or a body follows, and the engine is not rigid.
 
     Example:
         >>> from ragdoll_ros import Push, Simulation, load_scene
@@ -94,7 +95,8 @@ class Simulation:
         self.reset_count = 0
         """Number of starts: the first, and one for each reset() and place()."""
         choice = resolve_engine(engine)
-        _check_passive(scene, choice)
+        for capability in _needed(scene):
+            require(capability, choice.make.capabilities, choice.name)
         self.engine_name, self.engine_reason = choice.name, choice.reason
         """Name of the engine, and why 'auto' did not select rigid."""
         self._make = partial(choice.make, workers=int(workers))
@@ -105,10 +107,9 @@ class Simulation:
             self._placed = placed_coordinates(scene.dolls)
         self._engine = self._make_engine(resolve_accuracy(accuracy))
         self._follows = any(placement.follow for placement in scene.dolls)
-        if self._follows and not self._engine.moves_bodies:
-            raise errors.WrongForm('engine', self.engine_name, 'rigid, for bodies with follow')
         self._start = self._engine.save()
-        self._sleep_detector, self._stability_test = SleepDetector(scene), StabilityTest(scene)
+        self._sleep_detector = SleepDetector(scene)
+        self._stability_test = StabilityTest(scene, self._engine.layout)
         self._swings = _swings(scene)
         self.reset()
 
@@ -164,6 +165,11 @@ class Simulation:
     starts = _deprecated('starts', 'reset_count')
     parts = _deprecated('parts', 'samples_per_tick')
     trail = _deprecated('trail', 'substates')
+
+    @property
+    def capabilities(self) -> frozenset[Capability]:
+        """What the engine can beyond what all engines can."""
+        return self._engine.capabilities
 
     @property
     def kinetic_energy(self) -> float:
@@ -226,10 +232,9 @@ class Simulation:
         first read. Raises WrongForm: the engine is not rigid.
         """
         if self._overlaps is None:
+            self._require(Capability.OVERLAPS)
             placed = self._placed or placed_coordinates(self.scene.dolls)
             self._overlaps = self._engine.overlaps(placed)
-        if self._overlaps is None:
-            raise errors.WrongForm('engine', self.engine_name, 'rigid, which finds overlaps')
         return self._overlaps
 
     @property
@@ -237,10 +242,8 @@ class Simulation:
         """Impulse (n, 3) N s of all contacts on each bone since the start, those of impacts
         included, world frame; the same while it sleeps. Raises WrongForm: the engine is not rigid.
         """
-        impulses = self._engine.contact_impulses
-        if impulses is None:
-            raise errors.WrongForm('engine', self.engine_name, 'rigid, which counts impulses')
-        return impulses.copy()
+        self._require(Capability.CONTACT_IMPULSES)
+        return self._engine.contact_impulses.copy()
 
     def record_impacts(self, limits: BiomechanicalLimits | None) -> None:
         """Record the impacts of each tick from the next one on in ``impacts``, with the force that
@@ -249,8 +252,10 @@ class Simulation:
 
         >>> simulation.record_impacts(None)
         """
-        if not self._engine.log_impacts(limits is not None) and limits is not None:
-            raise errors.WrongForm('engine', self.engine_name, 'rigid, which finds times of impact')
+        if limits is not None:
+            self._require(Capability.IMPACTS)
+        if limits is not None or self._impact_recorder is not None:
+            self._engine.log_impacts(limits is not None)
         self._impact_recorder = None if limits is None else ImpactRecorder(self.scene, limits)
 
     @property
@@ -398,8 +403,7 @@ class Simulation:
 
         >>> simulation.hold('left_shin', stiffness=300, damping=5)
         """
-        if not self._engine.supports_joint_springs:
-            raise errors.WrongForm('engine', self.engine_name, 'rigid, which has joint springs')
+        self._require(Capability.JOINT_SPRINGS)
         self._joint_springs.hold(angle, stiffness, damping, target, self.joint_angles)
 
     def go_limp(self, angles: Sequence[str] | None = None) -> None:
@@ -571,7 +575,8 @@ class Simulation:
         self._engine = self._make_engine(accuracy)
         self._start = self._engine.save()
         self._engine.restore_checkpoint(engine_checkpoint)
-        self._engine.log_impacts(self._impact_recorder is not None)
+        if self._impact_recorder is not None:
+            self._engine.log_impacts(True)
         self._clear_impacts()
         self._driven.forget_twists()
         self._sleep_detector.restart()
@@ -640,9 +645,14 @@ class Simulation:
             raise errors.UnknownDoll('doll', doll, errors.one_of(names, doll))
         return names.index(doll)
 
-    def _make_engine(self, accuracy: Accuracy) -> Engine:
-        """A new engine at the start of the scene."""
-        engine: Engine = self._make(self.scene, accuracy)
+    def _require(self, capability: Capability) -> None:
+        """Raise WrongForm if the engine lacks a capability."""
+        require(capability, self.capabilities, self.engine_name)
+
+    def _make_engine(self, accuracy: Accuracy, before: Engine | None = None) -> Engine:
+        """A new engine at the start of the scene; ``before``: that of other dolls."""
+        engine: Engine = before.with_dolls(self.scene) if before else (
+            self._make(self.scene, accuracy))
         if self._placed is not None:
             engine.set_coordinates(self._placed)
         return engine
@@ -650,9 +660,7 @@ class Simulation:
     def _change_scene(self, dolls: Sequence[Placement]) -> State:
         """Go on with these dolls: those that stay in the states that they have."""
         old = self._engine
-        if not old.supports_scene_changes:
-            raise errors.WrongForm('engine', self.engine_name,
-                                   'rigid, which adds and removes dolls while it runs')
+        self._require(Capability.SCENE_CHANGES)
         change = SceneChange(self.scene, dataclasses.replace(self.scene, dolls=tuple(dolls)))
         clusters, gone = old.cluster_of_doll, change.new_dolls < 0
         self._sleep_detector.restart(np.isin(clusters, clusters[gone]))
@@ -662,7 +670,7 @@ class Simulation:
                 self._placed or placed_coordinates(self.scene.dolls), change)
         self.scene, self._overlaps = change.after, None
         self._follows = any(placement.follow for placement in dolls)
-        self._engine = self._make_engine(old.accuracy)
+        self._engine = self._make_engine(old.accuracy, old)
         self._start = self._engine.save()
         self._engine.continue_from(old, change)
         if self._impact_recorder is not None:
@@ -682,7 +690,7 @@ class Simulation:
         self._joint_springs = self._joint_springs.changed(change)
         detector, self._sleep_detector = self._sleep_detector, SleepDetector(self.scene)
         self._sleep_detector.continue_from(detector, change)
-        self._stability_test = StabilityTest(self.scene)
+        self._stability_test = StabilityTest(self.scene, self._engine.layout)
         for name in ('_gap', '_heights', '_yields'):
             self.__dict__.pop(name, None)
         before, self._swings = self._swings, _swings(self.scene)
@@ -735,7 +743,7 @@ class Simulation:
         dolls = detector.find_ready(self._engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs
             return
-        if self._engine.simulates_copies:
+        if Capability.COPIES in self._engine.capabilities:
             dolls &= ~self._disturb_unstable(dolls)
         if dolls.any():
             self._engine.put_to_sleep(dolls)
@@ -778,12 +786,12 @@ class Simulation:
         return self._hands.springs + self._joint_springs.springs
 
 
-def _check_passive(scene: Scene, choice: EngineChoice) -> None:
-    """Raise WrongForm for passive torques with an engine that would leave them out."""
-    has_passive = any(any(joint.passive) for placement in scene.dolls
-                      for joint in placement.doll.joints)
-    if has_passive and not choice.make.supports_joint_springs:
-        raise errors.WrongForm('engine', choice.name, 'rigid, which has passive joint torques')
+def _needed(scene: Scene) -> Iterator[Capability]:
+    """Capabilities without which an engine would leave out a part of a scene."""
+    if any(any(joint.passive) for placement in scene.dolls for joint in placement.doll.joints):
+        yield Capability.PASSIVE_TORQUES
+    if any(placement.follow for placement in scene.dolls):
+        yield Capability.DRIVEN_BODIES
 
 
 def _swings(scene: Scene) -> SwingSimulation | None:

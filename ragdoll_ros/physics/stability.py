@@ -61,14 +61,13 @@ class RestVerdict:
 class StabilityTest:
     """Tests clusters of a scene's dolls by copies in simulation, at rest and disturbed."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, layout: DofLayout) -> None:
         extents = np.array([0.0 if placement.is_kinematic else placement.doll.extent
                             for placement in scene.dolls])
         gravity = math.hypot(*scene.gravity)
         self._durations = DURATION * np.sqrt(2 * extents / (3 * gravity)) if gravity else (
             np.full(len(extents), math.inf))
         self._masses = np.array([placement.doll.mass for placement in scene.dolls])
-        layout = DofLayout([placement.doll for placement in scene.dolls])
         self._disturbance = np.zeros(layout.sizes[1])
         self._doll_of_v = np.zeros(layout.sizes[1], np.int64)
         for doll, own in enumerate(layout.doll_v):

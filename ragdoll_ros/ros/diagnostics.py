@@ -12,6 +12,7 @@ from rclpy.node import Node
 
 from ..model.push import Push
 from ..model.scene import SECOND
+from ..physics.engine.capabilities import Capability
 from .inputs.input_counts import InputCounts
 from .messages.convert import to_time
 
@@ -175,8 +176,8 @@ def pushes_text(pushes: Sequence[Push]) -> str:
 
 
 def overlaps_text(simulation: Simulation) -> str:
-    """The deepest initial overlaps in words; 'none', and 'unknown' by engines other than rigid."""
-    if simulation.engine_name != 'rigid':
+    """The deepest initial overlaps in words; 'none'; 'unknown' by engines that do not find them."""
+    if Capability.OVERLAPS not in simulation.capabilities:
         return 'unknown'
     found = simulation.initial_overlaps
     more = len(found) - MOST_OVERLAPS

@@ -14,6 +14,7 @@ from ...model.scene import Scene
 from ...model.scene_change import SceneChange
 from ...model.state import State
 from ..accuracy import Accuracy
+from .capabilities import Capability
 from .doll_totals import DollTotals
 
 GROUND = -1
@@ -210,14 +211,8 @@ class Engine(Protocol):
     """May be changed between ticks."""
     energy_error: float
     """Relative energy gain in a tick above which the state counts as diverged; see Guard."""
-    supports_joint_springs: bool
-    """Whether advance() takes AppliedJointSpring."""
-    moves_bodies: bool
-    """Whether there are bodies with ``follow``, and set_twist()."""
-    supports_scene_changes: bool
-    """Whether there is continue_from()."""
-    simulates_copies: bool
-    """Whether there are set_velocities() and simulate_copy(), for StabilityTest."""
+    capabilities: frozenset[Capability]
+    """Methods that are marked with one are there only with it."""
     sleeping: np.ndarray
     """(d,) bool: dolls that are not integrated until a load or another doll wakes them."""
 
@@ -265,24 +260,32 @@ class Engine(Protocol):
     def set_twist(self, doll: int, velocity: np.ndarray, spin: np.ndarray) -> None:
         """Set the velocity (3,) m/s of the centre of mass and the angular velocity (3,) rad/s,
         world frame, at which a doll that follows exactly moves from now on; wake its cluster.
+        DRIVEN_BODIES.
+        """
+
+    def with_dolls(self, scene: Scene) -> Engine:
+        """A new engine at the start of ``scene``, which differs from this one's in its dolls alone;
+        it shares what depends on a doll and not on its state. SCENE_CHANGES.
         """
 
     def continue_from(self, engine: Engine, change: SceneChange) -> None:
         """Take the states of the dolls that stay, to the bit, from the ``engine`` of the scene
         before; its clusters that lose a doll wake. A doll that comes adds its energy to the
-        account, one that goes takes its energy; excess and work stay.
+        account, one that goes takes its energy; excess and work stay. SCENE_CHANGES.
         """
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
-        """Integrate over ``duration`` s, under loads that act during all of it."""
+        """Integrate over ``duration`` s, under loads that act during all of it. JOINT_SPRINGS: also
+        AppliedJointSpring.
+        """
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
         """Set the velocities of dolls (d,), whole clusters, to zero; their energy is removed."""
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
         """Set the generalized velocities of dolls (d,), whole clusters, to theirs in ``velocities``
-        (nv,). The change of energy counts as work of pushes.
+        (nv,). The change of energy counts as work of pushes. COPIES, for StabilityTest.
         """
 
     def simulate_copy(self, dolls: np.ndarray, velocities: np.ndarray,
@@ -290,7 +293,7 @@ class Engine(Protocol):
         """Kinetic energies (d,) J of a copy of ``dolls`` (d,), whole clusters, without loads and by
         themselves: as it starts with ``velocities`` (nv,), and after each ``interval``, s, in
         coarse steps. The first interval is shorter, in finer ones. The dolls stay as they are, to
-        the bit, once the generator is closed.
+        the bit, once the generator is closed. COPIES.
         """
 
     def dolls_on_ground(self) -> np.ndarray:
@@ -300,20 +303,20 @@ class Engine(Protocol):
         """All contact points."""
 
     @property
-    def contact_impulses(self) -> np.ndarray | None:
-        """Impulse (n, 3) N s of contacts on each bone since the start; None: not counted."""
+    def contact_impulses(self) -> np.ndarray:
+        """Impulse (n, 3) N s of contacts on each bone since the start. CONTACT_IMPULSES."""
 
-    def overlaps(self, coordinates: GeneralizedState) -> tuple[Overlap, ...] | None:
-        """What would overlap at ``coordinates`` by more than a contact, the deepest first; None:
-        not found out. The state remains to the bit.
+    def overlaps(self, coordinates: GeneralizedState) -> tuple[Overlap, ...]:
+        """What would overlap at ``coordinates`` by more than a contact, the deepest first; the
+        state remains to the bit. OVERLAPS.
         """
 
-    def log_impacts(self, enabled: bool) -> bool:
-        """Begin or end to log impacts; returns whether the engine can."""
+    def log_impacts(self, enabled: bool) -> None:
+        """Begin or end to log impacts. IMPACTS."""
 
     @property
     def impacts(self) -> Impacts | None:
-        """Impacts in the last advance(); None: they are not logged."""
+        """Impacts in the last advance(); None: they are not logged. IMPACTS."""
 
     def bones_on_ground(self) -> np.ndarray:
         """Which bones (n,) touch the ground."""

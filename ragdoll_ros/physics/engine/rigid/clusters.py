@@ -40,6 +40,9 @@ CHECKPOINT = ('q', 'v', 'excluded', 'contact_impulses', 'stats')
 LOGGED_IMPACTS = 8
 """Room in the log of impacts, for each bone; what meets more often in a tick rattles."""
 
+OWN_SCRATCH = ('stats', 'excluded', 'gaps')
+"""Fields of a workspace that are those of a cluster's state."""
+
 PARTS_PER_THREAD = 4
 """Parts of the work for each thread; a thread that finishes early takes another part."""
 
@@ -90,17 +93,19 @@ class Cluster:
 class Clusters:
     """All dolls of a scene in clusters; coordinates, states and sums of the whole scene."""
 
-    def __init__(self, scene: Scene, layout: DofLayout, workers: int) -> None:
+    def __init__(self, scene: Scene, layout: DofLayout, workers: int,
+                 like: Clusters | None = None) -> None:
         self._scene = scene
-        self._systems, self._laws = _each_doll(scene)
+        self._systems, self._laws = _each_doll(scene, like)
         self._kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
         """(d,) dolls that set_velocities() leaves as they are."""
         self._q = [np.arange(own.start, own.stop) for own in layout.doll_q]
         self._v = [np.arange(own.start, own.stop) for own in layout.doll_v]
         self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
         self._bones = [np.arange(own.start, own.stop) for own in scene.bone_slices]
-        self._workspaces: dict[int, list[Workspace]] = {}
-        self._workers, self._threads = workers, None
+        self._shared: dict[int, tuple[list[Workspace], list[list[np.ndarray]]]] = {}
+        """Of each system by its id: the workspaces that equal dolls share, and what binds both."""
+        self.workers, self._threads = workers, None
         self._states = DollStates(self._systems)
         whole = self._states.arrays
         self.q, self.v, self.bone_states = whole['q'], whole['v'], whole['bone_states'].reshape(
@@ -177,7 +182,7 @@ class Clusters:
                 _invalidate(cluster)
         if np.count_nonzero(whole) < len(whole):  # a third of what all() costs
             jobs = jobs[:, whole]
-        if self._workers == 1 or jobs.shape[1] < 2:
+        if self.workers == 1 or jobs.shape[1] < 2:
             kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)
         else:
             self._advance_parallel(jobs, duration, accuracy, self._firsts[whole])
@@ -461,7 +466,7 @@ class Clusters:
         self.have_pairs[self.pairs] = True
         self._keys_of_pairs = frozenset(self._pair_keys(self.pairs).tolist())
         self._jobs = np.array([[cluster.job(worker) for cluster in clusters]
-                               for worker in range(self._workers)], np.int64)
+                               for worker in range(self.workers)], np.int64)
         """(workers, k, 3)"""
 
     def _advance_parallel(self, jobs: np.ndarray, duration: float, accuracy: Accuracy,
@@ -469,11 +474,11 @@ class Clusters:
         """Advance clusters on several threads, those first that took most steps the last time.
         ``firsts`` (k,): the first doll of each.
         """
-        self._threads = self._threads or ThreadPoolExecutor(self._workers - 1, 'clusters')
+        self._threads = self._threads or ThreadPoolExecutor(self.workers - 1, 'clusters')
         effort = self.stats['steps'] + self.stats['impacts'] + 6 * self.stats['flight_steps']
         spent, self._effort = effort - self._effort, effort
         order = np.argsort(-spent[firsts], kind='stable')
-        shares = min(len(order), PARTS_PER_THREAD * self._workers)
+        shares = min(len(order), PARTS_PER_THREAD * self.workers)
         parts = itertools.count()
 
         def work(worker: int) -> None:
@@ -481,7 +486,7 @@ class Clusters:
                 kernels.advance(jobs[worker, order[part::shares]], duration, accuracy.step,
                                 accuracy.flight_error)
 
-        others = [self._threads.submit(work, worker) for worker in range(1, self._workers)]
+        others = [self._threads.submit(work, worker) for worker in range(1, self.workers)]
         work(0)
         for other in others:
             other.result()
@@ -550,13 +555,15 @@ class Clusters:
         """The cluster of one doll, a view of the scene's state; equal dolls share workspaces."""
         system, state = self._systems[doll], self._states[doll]
         bones, q, v = self._bones[doll], self._q[doll], self._v[doll]
-        if id(system) not in self._workspaces:
-            self._workspaces[id(system)] = [
-                make_workspace(system, state) for _ in range(self._workers)]
-        workspaces = [one._replace(stats=state.stats, excluded=state.excluded, gaps=state.gaps)
-                      for one in self._workspaces[id(system)]]
-        return _bind_cluster(np.array([doll]), NO_PAIRS, NO_KEYS, bones, q, v, system, state,
-                             workspaces)
+        if id(system) not in self._shared:
+            made = [make_workspace(system, state) for _ in range(self.workers)]
+            self._shared[id(system)] = made, [bind(part) for part in (system, *made)]
+        shared, (bound, *each) = self._shared[id(system)]
+        workspaces = [one._replace(**{name: getattr(state, name) for name in OWN_SCRATCH})
+                      for one in shared]
+        rows = [_bound_alike(rows, one) for rows, one in zip(each, workspaces, strict=True)]
+        return Cluster(np.array([doll]), NO_PAIRS, NO_KEYS, bones, q, v, system, state, workspaces,
+                       [bound, bind(state), *rows])
 
     def _make(self, dolls: np.ndarray, pairs: np.ndarray) -> Cluster:
         """A cluster of ``dolls`` with their present coordinates and velocities."""
@@ -649,18 +656,38 @@ def _bind_cluster(*parts: object) -> Cluster:
     return Cluster(*parts, [bind(part) for part in (system, state, *workspaces)])
 
 
-def _each_doll(scene: Scene) -> tuple[list[System], list[np.ndarray]]:
+def _bound_alike(rows: list[np.ndarray], workspace: Workspace) -> list[np.ndarray]:
+    """Rows that bind a workspace, by those of another one that differs from it in OWN_SCRATCH:
+    to bind all of its arrays would take most of the time in which dolls come and go.
+    """
+    row, at = rows[0].copy(), 0
+    for name, part in zip(workspace._fields, workspace, strict=True):
+        if name in OWN_SCRATCH:
+            row[at] = part.ctypes.data
+        at += 1 if isinstance(part, tuple) else 1 + part.ndim
+    return [row, *rows[1:]]
+
+
+def _each_doll(scene: Scene, like: Clusters | None) -> tuple[list[System], list[np.ndarray]]:
     """The system of each doll by itself, and the contact laws of its geoms; equal dolls share
-    theirs.
+    theirs, also with those of ``like``, whose scene differs in its dolls alone.
     """
     made: dict[tuple[int, bool], tuple[System, np.ndarray]] = {}
-    keys = [(id(placement.doll), placement.is_kinematic) for placement in scene.dolls]
+    if like is not None:
+        made = dict(zip(_keys(like._scene), zip(like._systems, like._laws, strict=True),
+                        strict=True))
+    keys = _keys(scene)
     for key, placement in zip(keys, scene.dolls, strict=True):
         if key not in made:
             alone = dataclasses.replace(scene, dolls=(placement,), bodies=())
             made[key] = build_system(alone), contact_laws(alone)
     each = [made[key] for key in keys]
     return [system for system, _ in each], [laws for _, laws in each]
+
+
+def _keys(scene: Scene) -> list[tuple[int, bool]]:
+    """What determines the system of each doll in a scene."""
+    return [(id(placement.doll), placement.is_kinematic) for placement in scene.dolls]
 
 
 def _known_contacts(cluster: Cluster) -> np.ndarray:

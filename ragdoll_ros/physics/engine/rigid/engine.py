@@ -17,6 +17,7 @@ from ....model.state import State
 from ...accuracy import DRAFT, Accuracy
 from ...rigid_body import GroundHeights
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
+from ..capabilities import Capability
 from ..doll_totals import DollTotals
 from ..protocol import (
     GROUND,
@@ -52,15 +53,14 @@ class RigidEngine:
     """An Engine of rigid bodies; see Engine."""
 
     energy_error = 1e-2
-    supports_joint_springs = True
-    moves_bodies = True
-    supports_scene_changes = True
-    simulates_copies = True
+    capabilities = frozenset(Capability)
 
-    def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
+    def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1,
+                 like: RigidEngine | None = None) -> None:
+        """``like``: an engine of a scene that differs in its dolls alone."""
         self.scene, self.accuracy = scene, accuracy
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
-        self._clusters = Clusters(scene, self.layout, workers)
+        self._clusters = Clusters(scene, self.layout, workers, like and like._clusters)
         self._broad_phase = BroadPhase(scene, self._clusters.reach())
         self._heights = GroundHeights(scene)
         self._spins = self.layout.root_angular_velocities
@@ -76,7 +76,7 @@ class RigidEngine:
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]
         """Pairs that overlap at the start: they are excluded until they separate."""
-        self.set_coordinates(placed_coordinates(scene.dolls))
+        self.set_coordinates(placed_coordinates(scene.dolls, self.layout))
         self._initial_overlaps = self._clusters.excluded(OVERLAPPING)
 
     @property
@@ -143,6 +143,9 @@ class RigidEngine:
         self._clusters.advance(0.0, self.accuracy, ~own)
         self._update_state()
         self._twisted.append(doll)
+
+    def with_dolls(self, scene: Scene) -> RigidEngine:
+        return RigidEngine(scene, self.accuracy, workers=self._clusters.workers, like=self)
 
     def continue_from(self, engine: RigidEngine, change: SceneChange) -> None:
         gone, excesses = change.new_dolls < 0, engine.energy_excesses
@@ -227,10 +230,9 @@ class RigidEngine:
     def contact_impulses(self) -> np.ndarray:
         return self._clusters.contact_impulses
 
-    def log_impacts(self, enabled: bool) -> bool:
+    def log_impacts(self, enabled: bool) -> None:
         self._clusters.log_impacts(enabled)
         self._impacts = None
-        return True
 
     @property
     def impacts(self) -> Impacts | None:

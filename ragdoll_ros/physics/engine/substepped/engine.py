@@ -11,6 +11,7 @@ from ....model.scene import LARGEST_FRICTION, NO_SLIP, Scene
 from ....model.state import State
 from ...accuracy import Accuracy
 from ...rigid_body import GroundHeights
+from ..capabilities import Capability
 from ..doll_totals import DollSums, DollTotals
 from ..protocol import GROUND, Drives, Springs, Wrenches, allowed_penetration
 from .energy_account import EnergyAccount, steady_time, work
@@ -35,10 +36,7 @@ class SubsteppedEngine(ABC):
     substeps. One thread computes all of them, whatever ``workers`` is.
     """
 
-    supports_joint_springs = False
-    moves_bodies = False
-    supports_scene_changes = False
-    simulates_copies = False
+    capabilities: frozenset[Capability] = frozenset()
 
     lags = True
     """Whether substeps are semi-implicit Euler: positions advance by the velocity at the end."""
@@ -139,20 +137,6 @@ class SubsteppedEngine(ABC):
     def dolls_on_ground(self) -> np.ndarray:
         """Whether any doll touches the ground, (d,): the dolls are one cluster."""
         return np.full(len(self.sleeping), any(GROUND in pair for pair in self._touching_pairs()))
-
-    def overlaps(self, coordinates: GeneralizedState) -> None:
-        return None
-
-    @property
-    def contact_impulses(self) -> None:
-        return None
-
-    def log_impacts(self, enabled: bool) -> bool:
-        return False
-
-    @property
-    def impacts(self) -> None:
-        return None
 
     def bones_on_ground(self) -> np.ndarray:
         contacts, on = self.contacts(), np.zeros(len(self.scene.bones), bool)

@@ -1,0 +1,26 @@
+"""What some engines can and others cannot; an engine states its own as ``capabilities``."""
+from __future__ import annotations
+
+from collections.abc import Collection
+from enum import Enum
+
+from ...model import errors
+
+
+class Capability(Enum):
+    """A capability; its value says in a message what an engine does that has it."""
+
+    JOINT_SPRINGS = 'has joint springs'
+    PASSIVE_TORQUES = 'has passive joint torques'
+    DRIVEN_BODIES = 'moves bodies with follow'
+    SCENE_CHANGES = 'adds and removes dolls while it runs'
+    OVERLAPS = 'finds overlaps'
+    CONTACT_IMPULSES = 'counts impulses'
+    IMPACTS = 'finds times of impact'
+    COPIES = 'simulates copies of dolls'
+
+
+def require(capability: Capability, among: Collection[Capability], name: str) -> None:
+    """Raise WrongForm if a capability is not among those of the engine of this name."""
+    if capability not in among:
+        raise errors.WrongForm('engine', name, f'rigid, which {capability.value}')
