@@ -22,6 +22,8 @@ from rclpy.parameter import Parameter
 from simulation_interfaces import action, msg, srv
 from std_srvs.srv import SetBool, Trigger
 
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.model import rotation
 from ragdoll_ros.ros.simulation_interfaces import (
     bounds,
@@ -30,8 +32,8 @@ from ragdoll_ros.ros.simulation_interfaces import (
     filters,
     run_state,
     spawning,
-    worlds,
 )
+from ragdoll_ros.ros.simulation_interfaces.resources import dolls, worlds
 from ragdoll_ros.ros.simulation_interfaces.servers import snake_case
 
 HALF = math.sqrt(0.5)
@@ -62,7 +64,7 @@ def fill(message, fields):
         if isinstance(value, dict):
             fill(getattr(message, name), value)
         elif isinstance(value, list) and value and isinstance(value[0], dict):
-            make = Vector3 if 'Vector3' in kind else msg.EntityCategory
+            make = Vector3 if 'Vector3' in kind else getattr(msg, kind[:-1].rpartition('/')[2])
             made = [make() for _ in value]
             for each, inner in zip(made, value, strict=True):
                 fill(each, inner)
@@ -122,9 +124,11 @@ def test_numbers_of_single_services_are_those_of_the_messages():
                                               'RESOURCE_PARSE_ERROR')),
             (entities, srv.SetEntityState.Response, ('INVALID_POSE',)),
             (spawning, srv.SpawnEntity.Response, (
-                'NAME_NOT_UNIQUE', 'NAME_INVALID', 'UNSUPPORTED_FORMAT', 'NO_RESOURCE',
-                'NAMESPACE_INVALID', 'RESOURCE_PARSE_ERROR', 'UNSUPPORTED_ASSETS',
-                'INVALID_POSE'))):
+                'NAME_NOT_UNIQUE', 'NAME_INVALID', 'NAMESPACE_INVALID', 'INVALID_POSE')),
+            (dolls, srv.SpawnEntity.Response, (
+                'UNSUPPORTED_FORMAT', 'NO_RESOURCE', 'RESOURCE_PARSE_ERROR',
+                'UNSUPPORTED_ASSETS')),
+            (spawning, srv.SpawnEntities.Response, ('ENTITIES_SPAWN_FAILED',))):
         for name in names:
             assert getattr(module, name) == getattr(response, name)
     scope = srv.ResetSimulation.Request
@@ -143,6 +147,7 @@ def test_features_are_those_of_the_services_that_there_are(node, call):
         'reset_simulation': {'SIMULATION_RESET', 'SIMULATION_RESET_STATE',
                              'SIMULATION_RESET_SPAWNED'},
         'spawn_entity': {'SPAWNING', 'SPAWNING_RESOURCE_STRING'}, 'delete_entity': {'DELETING'},
+        'spawn_entities': {'SPAWNING_ENTITIES'},
         'get_spawnables': {'SPAWNABLES'},
         'get_simulation_state': {'SIMULATION_STATE_GETTING'},
         'set_simulation_state': {'SIMULATION_STATE_SETTING', 'SIMULATION_STATE_PAUSE'},
@@ -157,7 +162,7 @@ def test_features_are_those_of_the_services_that_there_are(node, call):
     assert served == {f'/ragdoll/{name}' for name in by_service}
     assert set(told.features) == {getattr(msg.SimulatorFeatures, name)
                                   for names in by_service.values() for name in names}
-    assert node.simulation_interfaces.status == '18 services, 1 action'
+    assert node.simulation_interfaces.status == '19 services, 1 action'
 
 
 def test_states_follow_each_other_and_the_node_s_own_services(node, peer, call):
@@ -434,7 +439,7 @@ def test_a_reset_takes_away_what_was_spawned(node, call):
 
 @pytest.mark.parametrize(('fields', 'wrong'), [
     ({'name': 'a/b'}, 102), ({'name': 'step_1'}, 101), ({'entity_namespace': 'ns'}, 105),
-    ({**spawned('')}, 104), ({**spawned('robot.urdf')}, 103), ({**spawned('nowhere')}, 2),
+    ({**spawned('')}, 104), ({**spawned('world.sdf')}, 103), ({**spawned('nowhere')}, 2),
     ({**spawned('', 'dolls: []')}, 106), ({**spawned('crowd')}, 108),
     ({'initial_pose': {'header': {'frame_id': 'map'}}}, 109),
     ({'initial_pose': {'pose': {'position': {'x': math.nan}}}}, 109),
@@ -459,13 +464,44 @@ def test_spawnables_are_the_dolls_and_can_be_spawned(node, call):
         bounds = call('GetEntityBounds', entity=response.entity_name).bounds
         np.testing.assert_allclose([[p.x, p.y, p.z] for p in bounds.points],
                                    [[p.x, p.y, p.z] for p in each.spawn_bounds.points], atol=1e-9)
-    assert code(call('GetSpawnables', sources=['/'])) == 4
+    robots = call('GetSpawnables', sources=[(ROOT / 'config').as_uri(), 'model://nothing'])
+    assert code(robots) == 1 and 'model://nothing' in robots.result.error_message
+    uris = [getattr(each, 'entity_resource', each).uri for each in robots.spawnables[5:]]
+    assert uris == [(ROOT / 'config' / name).as_uri() for name in ('character.glb', 'robot.urdf')]
+    for uri in uris:
+        response = call('SpawnEntity', **spawned(uri), initial_pose={
+            'pose': {'position': {'x': -20.0, 'y': len(uri) / 2, 'z': 2.0}}})
+        assert code(response) == 1, response
+        state = call('GetEntityState', entity=response.entity_name).state
+        assert row(state)[:3] == pytest.approx([-20, len(uri) / 2, 2])
+
+
+def test_several_are_spawned_and_those_that_cannot_be_are_named(node, call):
+    time, before = node.simulation.time, node.simulation.state.rows.tobytes()
+    text = to_urdf(load_doll('doll'))
+
+    def request(name, uri='', text='', **fields):
+        return {'name': name, 'entity_resource': {'uri': uri, 'resource_string': text}, **fields}
+
+    response = call('SpawnEntities', spawn_requests=[
+        request('anna', 'woman', initial_pose={'pose': {'position': {'x': -3.0, 'z': 2.0}}}),
+        request('anna', 'man', allow_renaming=True,
+                initial_pose={'pose': {'position': {'x': -4.0, 'z': 2.0}}}),
+        request('anna', 'man'), request('limp', text=text), request('', 'nowhere')])
+    assert code(response) == 150 and '2 of 5' in response.result.error_message
+    assert [(code(each), each.entity_name) for each in response.results] == [
+        (1, 'anna'), (1, 'anna_2'), (101, ''), (1, 'limp'), (2, '')]
+    assert [each.name for each in node.simulation.scene.dolls] == ['man', 'anna', 'anna_2', 'limp']
+    assert node.simulation.state.rows.tobytes().startswith(before)
+    assert node.simulation.time == time
+    assert row(call('GetEntityState', entity='anna_2').state)[:3] == pytest.approx([-4, 0, 2])
+    assert code(call('SpawnEntities')) == 1
 
 
 def test_with_another_engine_nothing_is_spawned_and_the_features_say_so(node, call):
-    assert {0, 1, 9, 14, 23} <= set(call('GetSimulatorFeatures').features.features)
+    assert {0, 1, 9, 14, 23, 50} <= set(call('GetSimulatorFeatures').features.features)
     node.set_parameters([Parameter('engine', value='bullet')])
-    assert not {0, 1, 9, 14, 23} & set(call('GetSimulatorFeatures').features.features)
+    assert not {0, 1, 9, 14, 23, 50} & set(call('GetSimulatorFeatures').features.features)
     response = call('SpawnEntity', **spawned('woman'))
     assert code(response) == 0 and 'expected rigid' in response.result.error_message
     assert code(call('DeleteEntity', entity='man')) == 0
@@ -481,7 +517,7 @@ def test_the_lines_of_the_documentation_are_served(node, peer, call):
         given = yaml.safe_load(fields or '{}')
         if not FLAGS and name == 'LoadWorld':
             given = given['world_resource']
-        if not FLAGS and name == 'SpawnEntity':
+        if not FLAGS and name == 'SpawnEntity':  # SpawnEntities is the same in both
             given |= given.pop('entity_resource')
         if not FLAGS and name == 'SetEntityState':
             given = {key: value for key, value in given.items() if not key.startswith('set_')}
@@ -524,9 +560,9 @@ def test_nothing_that_is_called_harms_the_node(node, peer):
     chance = random.Random(7)
     names = [name for name in dir(srv) if name[0].isupper()
              and f'/ragdoll/{snake_case(name)}' in dict(node.get_service_names_and_types())]
-    assert len(names) == 18
-    for count in range(540):
-        name = names[count % 18]
+    assert len(names) == 19
+    for count in range(570):
+        name = names[count % 19]
         request = getattr(srv, name).Request()
         for field, kind in request.get_fields_and_field_types().items():
             setattr(request, field, rubbish(chance, kind))

@@ -93,6 +93,26 @@ uint16[] features
 string[] spawn_formats
 string custom_info
 """,
+    'msg/SpawnEntity.msg': """
+string name
+bool allow_renaming
+Resource entity_resource
+string entity_namespace
+geometry_msgs/PoseStamped initial_pose
+""",
+    'msg/SpawnResult.msg': """
+uint8 NAME_NOT_UNIQUE=101
+uint8 NAME_INVALID=102
+uint8 UNSUPPORTED_FORMAT=103
+uint8 NO_RESOURCE=104
+uint8 NAMESPACE_INVALID=105
+uint8 RESOURCE_PARSE_ERROR=106
+uint8 MISSING_ASSETS=107
+uint8 UNSUPPORTED_ASSETS=108
+uint8 INVALID_POSE=109
+Result result
+string entity_name
+""",
     'msg/Spawnable.msg': """
 Resource entity_resource
 string description
@@ -224,6 +244,13 @@ uint8 ALREADY_IN_TARGET_STATE=101
 uint8 STATE_TRANSITION_ERROR=102
 uint8 INCORRECT_TRANSITION=103
 Result result
+""",
+    'srv/SpawnEntities.srv': """
+SpawnEntity[] spawn_requests
+---
+uint8 ENTITIES_SPAWN_FAILED=150
+Result result
+SpawnResult[] results
 """,
     'srv/SpawnEntity.srv': """
 string name

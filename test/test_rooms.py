@@ -25,6 +25,10 @@ ARROWS = {
     'falls': {'physics', 'people', 'files', 'model'}}
 """What a room may import of others."""
 
+TIED = {'ros': ('viewer.sources.node', 'replay.published'),
+        'fit': ('ros.simulation_interfaces.resources.dolls',)}
+"""Modules that may import a room that theirs may not."""
+
 ONLY = {'pybullet': 'physics/engine/substepped/bullet.py',
         'mujoco': 'physics/engine/substepped/mujoco.py',
         'numba': 'physics/kernels/', 'viser': 'viewer/',
@@ -96,7 +100,7 @@ def broken_arrows(edges: Edges) -> list[str]:
         room, other = name.partition('.')[0], target.partition('.')[0]
         if target.startswith(':') or room == other or room == '' or target == '':
             continue
-        tied = name.startswith(('viewer.sources.node', 'replay.published')) and other == 'ros'
+        tied = name.startswith(TIED.get(other, ()))
         if not tied and other not in ARROWS.get(room, set()):
             found.append(f'{name} -> {target}')
         if room == 'physics' and other == 'files' and not name.startswith('physics.engine.'):

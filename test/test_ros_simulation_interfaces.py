@@ -18,11 +18,14 @@ from message_packages import build
 from samples import random_coordinates
 from simulation_interfaces_types import VERSION_1, VERSION_2
 
+from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.model import rotation, shapes
 from ragdoll_ros.model.pose import Pose
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.physics.engine.capabilities import Capability
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.ros.simulation_interfaces import servers
 from ragdoll_ros.ros.simulation_interfaces.bounds import Kind, Volume, bounding_box, own_box
@@ -31,13 +34,10 @@ from ragdoll_ros.ros.simulation_interfaces.entities import Category, Entities
 from ragdoll_ros.ros.simulation_interfaces.entity_services import EntityServices
 from ragdoll_ros.ros.simulation_interfaces.filters import Filters
 from ragdoll_ros.ros.simulation_interfaces.pattern import Pattern
+from ragdoll_ros.ros.simulation_interfaces.resources.dolls import doll_of
+from ragdoll_ros.ros.simulation_interfaces.resources.spawnables import shipped, spawnables
 from ragdoll_ros.ros.simulation_interfaces.simulation_services import SimulationServices, features
-from ragdoll_ros.ros.simulation_interfaces.spawning import (
-    SpawnServices,
-    at_root_pose,
-    placement_of,
-    spawnables,
-)
+from ragdoll_ros.ros.simulation_interfaces.spawning import SpawnServices, at_root_pose
 
 DOCS = (ROOT / 'docs/simulation_interfaces.md').read_text()
 
@@ -164,27 +164,56 @@ def test_a_resource_is_one_doll_with_its_root_where_it_is_to_be():
     """Whatever its axes are, and with joint angles of its own."""
     text = ROOT.joinpath('config/drop.yaml').read_text()
     turn = rotation.normalized(np.array([0.1, -0.2, 0.3, 0.9]))
-    for placement in (placement_of('woman', ''), placement_of('', text), placement_of('slope', ''),
-                      placement_of((ROOT / 'config/man.yaml').as_uri(), 'ignored')):
+    robot = ROOT.joinpath('config/robot.urdf')
+    for placement, _ in (
+            doll_of('woman', ''), doll_of('', text), doll_of('slope', ''),
+            doll_of((ROOT / 'config/man.yaml').as_uri(), 'ignored'), doll_of(str(robot), ''),
+            doll_of('', robot.read_text()), doll_of((ROOT / 'config/character.glb').as_uri(), '')):
         placed = at_root_pose(placement, Pose(np.array([1.0, 2, 3]), turn))
         with Simulation(Scene('one', (placed,))) as simulation:
             root = simulation.state.poses(simulation.scene.bone_index(placed.doll.root.name))
             np.testing.assert_allclose(root.position, [1, 2, 3], atol=1e-12)
             assert rotation.angle_between(root.orientation, turn) < 1e-7
-    assert {each.name for each in spawnables()} == {
+
+
+def test_a_robot_and_a_character_are_what_the_fit_makes_of_them():
+    robot = doll_of('', to_urdf(load_doll('doll'))).placement.doll
+    assert {bone.name for bone in robot.bones} == {bone.name for bone in load_doll('doll').bones}
+    assert robot.mass == pytest.approx(load_doll('doll').mass, rel=1e-9)
+    character = doll_of(str(ROOT / 'config/character.glb'), '').placement.doll
+    assert {bone.name for bone in character.bones} == {
+        bone.name for bone in load_doll('character').bones}
+    assert 'no mass' in doll_of(str(ROOT / 'config/robot.urdf'), '').notes[0]
+    assert character.model == str(ROOT / 'config/character.glb')
+
+
+def test_spawnables_are_the_dolls_in_config_and_what_folders_hold(tmp_path):
+    assert {each.uri for each in shipped()} == {
         'article_doll', 'character', 'doll', 'man', 'woman'}
-    heights = {each.name: np.ptp(each.box, axis=0)[2] for each in spawnables()}
+    heights = {each.uri: np.ptp(each.box, axis=0)[2] for each in shipped()}
     assert 1.5 < heights['woman'] < heights['man'] < 1.9
+    for name in ('a robot.urdf', 'b.GLB', 'notes.txt'):
+        tmp_path.joinpath(name).write_text('')
+    found, message = spawnables([tmp_path.as_uri(), str(tmp_path / 'nothing'), 'model://x'])
+    assert [each.uri for each in found[len(shipped()):]] == [
+        (tmp_path / name).as_uri() for name in ('a robot.urdf', 'b.GLB')]
+    assert str(tmp_path / 'nothing')[:50] in message and 'model://x' in message
 
 
 @pytest.mark.parametrize(('uri', 'text', 'code'), [
-    ('', ' ', 104), ('nowhere', '', 2), ('robot.urdf', '', 103), ('', '<robot/>', 103),
+    ('', ' ', 104), ('nowhere', '', 2), ('world.sdf', '', 103), ('', '<sdf/>', 103),
+    ('nowhere.urdf', '', 2), ('', '<robot/>', 106), ('', '<robot name="hunter2"', 106),
+    ('SECRET.urdf', '', 106), ('SECRET.glb', '', 106), ('SECRET.gltf', '', 106),
     ('crowd', '', 108), ('', 'password: hunter2', 106), ('', 'dolls: [{doll: nobody}]', 106),
     ('node', '', 106)])
-def test_a_resource_that_is_none_is_refused_with_the_standard_s_code(uri, text, code):
+def test_a_resource_that_is_none_is_refused_with_the_standard_s_code(uri, text, code, tmp_path):
+    if uri.startswith('SECRET'):
+        uri = str(tmp_path / uri)
+        Path(uri).write_text('password: hunter2')
     with pytest.raises(Refusal) as refused:
-        placement_of(uri, text)
-    assert refused.value.code == code and 'hunter2' not in str(refused.value)
+        doll_of(uri, text)
+    assert refused.value.code == code
+    assert 'hunter2' not in str(refused.value) or 'hunter2' in text
 
 
 @pytest.mark.skipif(servers.srv is not None, reason='simulation_interfaces is installed')
@@ -209,7 +238,7 @@ def test_the_lines_of_the_documentation_have_the_fields_of_the_services():
     assert {name for row in rows for name in re.findall(r'`([a-z_]+)`', row[1])} == {
         servers.snake_case(name) for name in served} | {'simulate_steps'}
     assert sorted({int(number) for row in rows for number in re.findall(r'\d+', row[2])}) == (
-        features(served))
+        features(served, Capability))
     assert {f'srv/{name}.srv' for name in served} <= set(VERSION_1)
 
 
@@ -224,6 +253,7 @@ def test_services_with_the_messages_of_both_versions(tmp_path, package):
         for name, path in places.items()}}
     done = subprocess.run(
         [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider',
-         str(Path(__file__).with_name('simulation_interfaces_served.py'))],
-        env=environment, cwd=ROOT, capture_output=True, text=True, timeout=900)
+         *(str(Path(__file__).with_name(f'simulation_interfaces_{part}.py'))
+           for part in ('served', 'changes'))],
+        env=environment, cwd=ROOT, capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -45,6 +45,7 @@ class Feature(IntEnum):
     WORLD_LOADING = 40
     WORLD_INFO_GETTING = 44
     AVAILABLE_WORLDS = 45
+    SPAWNING_ENTITIES = 50
 
 
 class Refusal(RagdollError):

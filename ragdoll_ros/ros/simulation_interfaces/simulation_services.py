@@ -1,22 +1,24 @@
 """Services on the simulation as a whole: features, state, reset, steps, worlds."""
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 from rclpy.action import CancelResponse
 from rclpy.parameter import Parameter
 
+from ...physics.engine.capabilities import Capability
 from .codes import Code, Feature, Refusal
 from .entity_services import EntityServices
+from .resources.dolls import SPAWN_FORMATS
+from .resources.worlds import RESOURCE_PARSE_ERROR, World, available, scene_of
 from .run_state import ALL, SPAWNED, STATE, TIME, ControlledNode, RunState, checked_scope
-from .spawning import ENGINE, SPAWN_FORMATS, SpawnServices
+from .spawning import SpawnServices
 from .stepping import Stepper
-from .worlds import RESOURCE_PARSE_ERROR, World, available, scene_of
 
 SPAWNING = {Feature.SIMULATION_RESET_SPAWNED,
             *(feature for each in SpawnServices.FEATURES.values() for feature in each)}
-"""Features that one engine has."""
+"""Features that need an engine that adds and removes dolls."""
 
 INFO = ('ragdoll_ros: docs/simulation_interfaces.md; entities are dolls, static bodies, and bones '
         'as doll/bone; accelerations are not filled')
@@ -83,7 +85,8 @@ class SimulationServices:
         return CancelResponse.ACCEPT
 
     def _get_features(self, _: Any, response: Any) -> None:
-        response.features.features = features(self.served, self._controlled.simulation.engine_name)
+        response.features.features = features(
+            self.served, self._controlled.simulation.capabilities)
         response.features.spawn_formats = list(SPAWN_FORMATS)
         response.features.custom_info = INFO
 
@@ -141,11 +144,11 @@ class SimulationServices:
         return resource
 
 
-def features(served: Iterable[str], engine: str = ENGINE) -> list[int]:
+def features(served: Iterable[str], capabilities: Collection[Capability]) -> list[int]:
     """Features of the action and of the services that are served, as numbers, ascending; without
     spawning where the engine cannot.
     """
     possible = {**SimulationServices.FEATURES, **EntityServices.FEATURES, **SpawnServices.FEATURES}
     found = {*SimulationServices.ACTION_FEATURES,
              *(feature for name in served for feature in possible[name])}
-    return sorted(found if engine == ENGINE else found - SPAWNING)
+    return sorted(found if Capability.SCENE_CHANGES in capabilities else found - SPAWNING)

@@ -1,19 +1,14 @@
-"""Services on what comes and goes: dolls of our YAML are spawned and deleted while time goes on."""
+"""Services on what comes and goes: dolls are spawned and deleted while time goes on."""
 from __future__ import annotations
 
 import dataclasses
-import functools
 import re
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
-from ...files import yaml_text
-from ...files.config import doll_names
-from ...files.doll import load_doll
-from ...files.scene import MOST_DOLLS, load_scene, scene_from_data
+from ...files.scene import MOST_DOLLS
 from ...model import rotation
 from ...model.errors import RagdollError
 from ...model.pose import Pose
@@ -22,33 +17,27 @@ from ...model.rotation import IDENTITY
 from ...model.scene import Placement, Scene
 from ...model.vectors import unit_vector
 from ...physics.actions.grab import checked_point
+from ...physics.engine.capabilities import Capability
 from ...physics.simulation import Simulation
 from ..messages.convert import to_vector
-from .bounds import Kind, bounding_box
+from .bounds import Kind
 from .codes import Code, Feature, Refusal
 from .entities import Entities
+from .resources.dolls import Found, doll_of
+from .resources.spawnables import spawnables
 from .run_state import ControlledNode
-from .worlds import scene_of
 
-NAME_NOT_UNIQUE, NAME_INVALID, UNSUPPORTED_FORMAT, NO_RESOURCE = 101, 102, 103, 104
-NAMESPACE_INVALID, RESOURCE_PARSE_ERROR, UNSUPPORTED_ASSETS, INVALID_POSE = 105, 106, 108, 109
+NAME_NOT_UNIQUE, NAME_INVALID, NAMESPACE_INVALID, INVALID_POSE = 101, 102, 105, 109
 """Results of SpawnEntity."""
 
-SPAWN_FORMATS = ('yaml',)
+ENTITIES_SPAWN_FAILED = 150
+"""Result of SpawnEntities."""
+
+MOST_REQUESTS = 100
+"""Entities of one request."""
 
 NAME = re.compile(r'[^\s/][^/\x00-\x1f]{0,99}')
 """As in the schema of scenes."""
-
-ENGINE = 'rigid'
-"""The engine that adds and removes dolls."""
-
-
-class Spawnable(NamedTuple):
-    """A doll in config/, and its box (2, 3) m about its root, lower corner first."""
-
-    name: str
-    description: str
-    box: np.ndarray
 
 
 class SpawnServices:
@@ -59,9 +48,10 @@ class SpawnServices:
 
     FEATURES = {
         'SpawnEntity': (Feature.SPAWNING, Feature.SPAWNING_RESOURCE_STRING),
+        'SpawnEntities': (Feature.SPAWNING_ENTITIES,),
         'DeleteEntity': (Feature.DELETING,),
         'GetSpawnables': (Feature.SPAWNABLES,)}
-    """What each service makes possible, with the engine rigid."""
+    """What each service makes possible, with an engine that has SCENE_CHANGES."""
 
     def __init__(self, controlled: ControlledNode, messages: Any,
                  entities: Callable[[], Entities]) -> None:
@@ -69,8 +59,9 @@ class SpawnServices:
         self._simulation: Simulation | None = None
         self._world: Scene
         """The simulation of the last change, and its scene before the first one."""
-        self.handlers = {'SpawnEntity': self._spawn, 'DeleteEntity': self._delete,
-                         'GetSpawnables': self._get_spawnables}
+        self.handlers = {
+            'SpawnEntity': self._spawn, 'SpawnEntities': self._spawn_several,
+            'DeleteEntity': self._delete, 'GetSpawnables': self._get_spawnables}
 
     @property
     def has_changed(self) -> bool:
@@ -89,21 +80,60 @@ class SpawnServices:
             simulation.remove(name) for name in spawned])
 
     def _spawn(self, request: Any, response: Any) -> None:
-        """Version 2 has a Resource, version 1 its fields."""
         self._check_engine()
+        placed, response.result.error_message = self._placed(request, {}, self._taken())
+        self._change(lambda simulation: simulation.add(placed))
+        response.entity_name = placed.name
+
+    def _spawn_several(self, request: Any, response: Any) -> None:
+        """All that can be, in one change; those that cannot leave the others alone."""
+        self._check_engine()
+        if len(request.spawn_requests) > MOST_REQUESTS:
+            raise Refusal(Code.OPERATION_FAILED, f'spawn_requests: {len(request.spawn_requests)}; '
+                          f'expected at most {MOST_REQUESTS}')
+        read: dict[tuple[str, str], Found] = {}
+        spawned: list[Placement] = []
+        for one in request.spawn_requests:
+            made = self._messages.SpawnResult()
+            response.results.append(made)
+            try:
+                taken = self._taken() | {placement.name for placement in spawned}
+                placed, made.result.error_message = self._placed(one, read, taken)
+                made.entity_name, made.result.result = placed.name, int(Code.OK)
+                spawned.append(placed)
+            except Refusal as refused:
+                made.result.result, made.result.error_message = refused.code, str(refused)
+        if spawned:
+            self._change(lambda simulation: [simulation.add(placed) for placed in spawned])
+        failed = len(response.results) - len(spawned)
+        if failed:
+            raise Refusal(ENTITIES_SPAWN_FAILED,
+                          f'{failed} of {len(response.results)} failed: see results')
+
+    def _placed(self, request: Any, read: dict[tuple[str, str], Found],
+                taken: set[str]) -> tuple[Placement, str]:
+        """What a SpawnEntity asks for, as it is to be placed, and notes on its resource.
+
+        ``read``: resources by uri and text, read once; ``taken``: names. The request of version 1
+        has the fields of a Resource. Raises Refusal.
+        """
         if request.entity_namespace:
             raise Refusal(NAMESPACE_INVALID, f'entity_namespace: {request.entity_namespace[:60]!r};'
                           " expected none, as a doll's topics are the node's")
         pose = self._pose(request.initial_pose)
         resource = getattr(request, 'entity_resource', request)
-        placement = self._controlled.run_beside(
-            lambda: placement_of(resource.uri, resource.resource_string))
-        name = self._unused_name(request.name or placement.name, request.allow_renaming)
-        placed = at_root_pose(dataclasses.replace(placement, name=name), pose)
-        if len(self._controlled.simulation.scene.dolls) >= MOST_DOLLS:
+        key = resource.uri, resource.resource_string
+        if key not in read:
+            read[key] = self._controlled.run_beside(lambda: doll_of(*key))
+        placement, notes = read[key]
+        name = _unused_name(request.name or placement.name, request.allow_renaming, taken)
+        if len(taken) - len(self._controlled.simulation.scene.bodies) >= MOST_DOLLS:
             raise Refusal(Code.OPERATION_FAILED, f'there are {MOST_DOLLS} dolls, the most')
-        self._change(lambda simulation: simulation.add(placed))
-        response.entity_name = name
+        return at_root_pose(dataclasses.replace(placement, name=name), pose), '; '.join(notes)
+
+    def _taken(self) -> set[str]:
+        """Names of all dolls and bodies."""
+        return {entity.name for entity in self._entities()}
 
     def _delete(self, request: Any, _: Any) -> None:
         self._check_engine()
@@ -114,15 +144,16 @@ class SpawnServices:
         self._change(lambda simulation: simulation.remove(entity.doll))
 
     def _get_spawnables(self, request: Any, response: Any) -> None:
-        if request.sources:
-            raise Refusal(Code.OPERATION_FAILED,
-                          f'sources: {len(request.sources)} not searched; expected none')
-        for found in self._controlled.run_beside(spawnables):
+        """Sources that are no folders are named, and hinder nothing."""
+        found, response.result.error_message = self._controlled.run_beside(
+            lambda: spawnables(request.sources))
+        for each in found:
             made = self._messages.Spawnable()
-            getattr(made, 'entity_resource', made).uri = found.name
-            made.description = found.description
-            made.spawn_bounds.type = int(Kind.BOX)
-            made.spawn_bounds.points = [to_vector(corner) for corner in found.box[::-1]]
+            getattr(made, 'entity_resource', made).uri = each.uri
+            made.description = each.description
+            if each.box is not None:
+                made.spawn_bounds.type = int(Kind.BOX)
+                made.spawn_bounds.points = [to_vector(corner) for corner in each.box[::-1]]
             response.spawnables.append(made)
 
     def _change(self, change: Callable[[Simulation], object]) -> None:
@@ -133,10 +164,10 @@ class SpawnServices:
         self._controlled.change_dolls(change)
 
     def _check_engine(self) -> None:
-        engine = self._controlled.simulation.engine_name
-        if engine != ENGINE:
-            raise Refusal(Code.FEATURE_UNSUPPORTED,
-                          f'engine {engine} adds and removes no dolls; expected {ENGINE}')
+        simulation = self._controlled.simulation
+        if Capability.SCENE_CHANGES not in simulation.capabilities:
+            raise Refusal(Code.FEATURE_UNSUPPORTED, f'engine {simulation.engine_name} adds and '
+                          'removes no dolls; expected rigid')
 
     def _pose(self, stamped: Any) -> Pose:
         """The pose of a PoseStamped. Raises Refusal unless it is valid and in the world frame."""
@@ -152,39 +183,16 @@ class SpawnServices:
         except RagdollError as error:
             raise Refusal(INVALID_POSE, error) from None
 
-    def _unused_name(self, name: str, allow_renaming: bool) -> str:
-        """The name, with a number if it is taken. Raises Refusal."""
-        if not NAME.fullmatch(name):
-            raise Refusal(NAME_INVALID, f'name: {name[:60]!r}; expected text without / and control '
-                          'characters, at most 100 characters')
-        taken = {entity.name for entity in self._entities()}
-        if name in taken and not allow_renaming:
-            raise Refusal(NAME_NOT_UNIQUE, f'name: {name[:60]!r} is taken; expected another one, '
-                          'or allow_renaming')
-        return next(each for each in _numbered(name) if each not in taken)
 
-
-def placement_of(uri: str, text: str) -> Placement:
-    """The doll of a resource, a scene of one doll or a doll, as it is placed there; its ground and
-    bodies are left out. Raises Refusal; says nothing of a file that is no scene.
-    """
-    try:
-        if uri:
-            scene = load_scene(scene_of(uri, '', UNSUPPORTED_FORMAT))
-        elif not text.strip():
-            raise Refusal(NO_RESOURCE, 'uri and resource_string are empty; expected a name in '
-                          'config/, a path, or YAML')
-        elif text.lstrip().startswith('<'):
-            raise Refusal(UNSUPPORTED_FORMAT, 'resource_string: expected a scene or doll as YAML')
-        else:
-            scene = scene_from_data(yaml_text.parse(text.encode()), Path('/resource_string'))
-    except Refusal:
-        raise
-    except RagdollError as error:
-        raise Refusal(RESOURCE_PARSE_ERROR, error) from None
-    if len(scene.dolls) > 1:
-        raise Refusal(UNSUPPORTED_ASSETS, f'a scene of {len(scene.dolls)} dolls; expected of one')
-    return scene.dolls[0]
+def _unused_name(name: str, allow_renaming: bool, taken: set[str]) -> str:
+    """The name, with a number if it is taken. Raises Refusal."""
+    if not NAME.fullmatch(name):
+        raise Refusal(NAME_INVALID, f'name: {name[:60]!r}; expected text without / and control '
+                      'characters, at most 100 characters')
+    if name in taken and not allow_renaming:
+        raise Refusal(NAME_NOT_UNIQUE, f'name: {name[:60]!r} is taken; expected another one, '
+                      'or allow_renaming')
+    return next(each for each in _numbered(name) if each not in taken)
 
 
 def at_root_pose(placement: Placement, pose: Pose) -> Placement:
@@ -195,18 +203,6 @@ def at_root_pose(placement: Placement, pose: Pose) -> Placement:
     position = pose.position - rotation.rotate(turn, root.position)
     return dataclasses.replace(placement, position=tuple(position.tolist()),
                                orientation=tuple(turn.tolist()))
-
-
-@functools.cache
-def spawnables() -> Sequence[Spawnable]:
-    """The dolls in config/."""
-    found = []
-    for name in doll_names():
-        doll = load_doll(name)
-        box = bounding_box([(bone.shape, doll.root.pose.relative(bone.pose))
-                            for bone in doll.bones])
-        found.append(Spawnable(name, f'doll of {len(doll.bones)} bones, {doll.mass:.3g} kg', box))
-    return tuple(found)
 
 
 def _numbered(name: str) -> Iterator[str]:

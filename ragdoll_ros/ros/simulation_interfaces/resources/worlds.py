@@ -8,9 +8,9 @@ from urllib.parse import unquote
 
 import yaml
 
-from ...files.config import config_folder, find, scene_names
-from ...model.errors import RagdollError
-from .codes import Code, Refusal
+from ....files.config import config_folder, find, scene_names
+from ....model.errors import RagdollError
+from ..codes import Code, Refusal
 
 UNSUPPORTED_FORMAT, NO_RESOURCE, RESOURCE_PARSE_ERROR = 101, 102, 103
 """Results of LoadWorld."""
@@ -40,16 +40,18 @@ def available(sources: Sequence[str], continue_on_error: bool) -> tuple[list[Wor
     return [World(name, name, _description(name)) for name in scene_names()], reason
 
 
-def scene_of(uri: str, text: str, unsupported: int = UNSUPPORTED_FORMAT) -> str:
-    """Value of the parameter `scene` for a resource. Raises Refusal, with the code ``unsupported``
-    for a file that is not YAML; says nothing of a file.
+def scene_of(uri: str, text: str, unsupported: int = UNSUPPORTED_FORMAT,
+             formats: tuple[str, ...] = FORMATS) -> str:
+    """Value of the parameter `scene` for a resource, or the name or path of another file. Raises
+    Refusal, with the code ``unsupported`` for a file of none of the ``formats``; says nothing of a
+    file.
     """
     if not uri:
         raise (Refusal(Code.FEATURE_UNSUPPORTED, 'resource_string: expected a uri') if text else
                Refusal(NO_RESOURCE, 'uri: expected a name in config/ or a path'))
     scene = unquote(uri.removeprefix('file://')) if uri.startswith('file:///') else uri
-    if not scene.lower().endswith(FORMATS) and re.search(r'\.\w+$', scene):
-        raise Refusal(unsupported, f'uri: {uri[:60]!r}; expected a scene as YAML')
+    if not scene.lower().endswith(formats) and re.search(r'\.\w+$', scene):
+        raise Refusal(unsupported, f'uri: {uri[:60]!r}; expected {", ".join(formats)}')
     try:
         find(scene)
     except RagdollError as error:

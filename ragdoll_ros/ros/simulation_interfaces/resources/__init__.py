@@ -1,0 +1,1 @@
+"""What services load: worlds, which are scenes, and dolls that are spawned."""
