@@ -197,14 +197,13 @@ def test_a_thousand_random_actions_concern_nobody_else(make_node, peer, tmp_path
     actions.twin.close()
 
 
-def test_messages_come_while_twenty_dolls_come_and_go(peer, tmp_path):
+def test_messages_come_while_twenty_dolls_come_and_go(peer, tmp_path, nothing_runs_on):
     """Poses 100 times a second, a change for every ten of them, up to 20 persons: 99 of 100 follow
     within three periods of the one before.
     """
     path = tmp_path / 'far.yaml'
     path.write_text(FAR)
     process = start('node', '--ros-args', '-p', f'scene:={path}', compiled=True)
-    HEIGHT = float(os.environ.get('Z', 1))
     call = caller(peer)
     assert code(call('GetSimulationState')) == 1
     with listening() as listener:
@@ -214,7 +213,7 @@ def test_messages_come_while_twenty_dolls_come_and_go(peer, tmp_path):
         for spawning in (True, False):
             for number in range(20):
                 if spawning:
-                    place = {'pose': {'position': {'x': 2.0 * number, 'z': HEIGHT}}}
+                    place = {'pose': {'position': {'x': 2.0 * number, 'z': 1.0}}}
                     response = call('SpawnEntity', name=f'one{number}', initial_pose=place,
                                     **spawned(('woman', 'man')[number % 2]))
                 else:

@@ -469,7 +469,7 @@ def test_spawnables_are_the_dolls_and_can_be_spawned(node, call):
     uris = [getattr(each, 'entity_resource', each).uri for each in robots.spawnables[5:]]
     assert uris == [(ROOT / 'config' / name).as_uri() for name in ('character.glb', 'robot.urdf')]
     for uri in uris:
-        response = call('SpawnEntity', **spawned(uri), initial_pose={
+        response = call('SpawnEntity', allow_renaming=True, **spawned(uri), initial_pose={
             'pose': {'position': {'x': -20.0, 'y': len(uri) / 2, 'z': 2.0}}})
         assert code(response) == 1, response
         state = call('GetEntityState', entity=response.entity_name).state

@@ -5,6 +5,7 @@ import json
 import math
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from std_msgs.msg import String
@@ -52,6 +53,13 @@ def test_odometry_moves_a_body_along_its_own_axes(node):
         node.tick()
     assert not robot(node)[7:].any()
     assert node.simulation.stale_bodies == ('my robot',)
+    node.pause(False)
+    node._diagnostics._on_timer()
+    level, message = node._diagnostics._level_and_message()
+    assert level == DiagnosticStatus.WARN and 'nothing moves my robot' in message
+    node.bodies.on_cmd_vel('my robot', Twist(linear=Vector3(x=1.0)))
+    node.tick()
+    assert 'nothing moves' not in node._diagnostics._level_and_message()[1]
     assert not node.input_counts.refused
 
 

@@ -1,13 +1,18 @@
 """The SROS2 policy: of the form that SROS2 reads, and what the nodes need and no more."""
+from fnmatch import fnmatchcase
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from test_ros_bodies import SCENE
 
 from ragdoll_ros.ros.simulation_interfaces.entity_services import EntityServices
 from ragdoll_ros.ros.simulation_interfaces.servers import snake_case
 from ragdoll_ros.ros.simulation_interfaces.simulation_services import SimulationServices
 from ragdoll_ros.ros.simulation_interfaces.spawning import SpawnServices
+
+PATTERNS = {'~/bodies/*/odom', '~/bodies/*/cmd_vel', '~/imu/*/data_raw'}
+"""Topics below the node's own name that are named after bones and bodies of its scene."""
 
 POLICY = Path(__file__).resolve().parent.parent / 'config' / 'ragdoll.policy.xml'
 
@@ -46,7 +51,7 @@ def allowed(node, kind, right):
 def test_the_policy_is_of_the_form_that_sros2_reads():
     paths = [each.get('path') for each in policy().iter('enclave')]
     assert sorted(paths) == ['/ragdoll', '/ragdoll_teleop']
-    assert not [each.text for each in policy().iter() if each.text and '*' in each.text]
+    assert {each.text for each in policy().iter() if each.text and '*' in each.text} == PATTERNS
 
 
 @pytest.fixture
@@ -65,13 +70,29 @@ def given(ros):
 def test_the_policy_allows_what_the_node_does_and_no_more(make_node, given):
     node = make_node(scene='ponytail', publish_clock=True)
     publish, hear, answer, ask = given(node)
-    assert publish | {'/tf'} == allowed('ragdoll', 'topics', 'publish')
-    assert hear | {'/clock'} == allowed('ragdoll', 'topics', 'subscribe')  # use_sim_time's
+    publishable, hearable = (allowed('ragdoll', 'topics', right) for right in (
+        'publish', 'subscribe'))
+    patterns = {f'/ragdoll{pattern[1:]}' for pattern in PATTERNS}
+    assert publish | {'/tf'} == publishable - patterns
+    assert hear | {'/clock'} == hearable - patterns  # use_sim_time's
     standard = {f'/ragdoll/{snake_case(name)}'  # where simulation_interfaces is installed
                 for services in (SimulationServices, EntityServices, SpawnServices)
                 for name in services.FEATURES}
     assert answer | standard == allowed('ragdoll', 'services', 'reply') and not ask
     assert allowed('ragdoll', 'actions', 'execute') == {'/ragdoll/simulate_steps'}
+
+
+def test_the_policy_allows_topics_of_sensors_and_driven_bodies(make_node, given, tmp_path):
+    """DDS compares with a pattern as fnmatch() does."""
+    path = tmp_path / 'robot.yaml'
+    path.write_text(SCENE)
+    node = make_node(scene=str(path), imus=['doll/torso'], start_paused=True)
+    publish, hear, _, _ = given(node)
+    for names, right, own in ((publish, 'publish', '/imu/'), (hear, 'subscribe', '/bodies/')):
+        patterns = allowed('ragdoll', 'topics', right)
+        assert any(own in name for name in names)
+        assert not [name for name in names if not any(fnmatchcase(name, pattern)
+                                                      for pattern in patterns)]
 
 
 def test_the_policy_allows_what_the_teleoperation_does_and_no_more(ros, given):

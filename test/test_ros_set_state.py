@@ -1,4 +1,4 @@
-"""~/set_state: Odometry sets pose and velocities of a doll, and what is wrong is refused."""
+"""~/set_state and ~/set_joint_states: what they set, and that what is wrong is refused."""
 from __future__ import annotations
 
 import json
@@ -18,6 +18,7 @@ from geometry_msgs.msg import (
     TwistWithCovariance,
 )
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
 HALF = math.sqrt(0.5)
@@ -128,3 +129,50 @@ def test_the_line_in_the_reference_is_understood(node):
     node.states.on_odometry(message)
     assert not node.input_counts.refused
     assert row(node, 'doll_3')[2] == 2 and row(node, 'doll_3')[9] == pytest.approx(3)
+
+
+def angles(node):
+    return dict(zip(node.simulation.scene.angle_names, node.simulation.joint_angles, strict=True))
+
+
+def test_joint_states_of_several_dolls_are_set_over_the_topic(node, peer):
+    """Angles and rates by the names of joint_states; the roots stay."""
+    peer.executor_.add_node(node)
+    node.pause(True)
+    roots = [row(node, doll) for doll in ('doll_2', 'doll_3')]
+    names = ['doll_3/left_shin', 'doll_2/right_shin']
+    peer.sender(JointState, '/ragdoll/set_joint_states').publish(
+        JointState(name=names, position=[0.5, 0.75], velocity=[0.0, -2.0]))
+    peer.wait(lambda: angles(node)[names[1]] == pytest.approx(0.75, abs=1e-9))
+    assert angles(node)[names[0]] == pytest.approx(0.5, abs=1e-9)
+    index = node.simulation.scene.angle_names.index(names[1])
+    assert node.simulation.joint_rates[index] == pytest.approx(-2)
+    for doll, before in zip(('doll_2', 'doll_3'), roots, strict=True):
+        assert row(node, doll) == pytest.approx(before, abs=1e-9)
+    node.states.on_joint_state(JointState(name=names, velocity=[1.0, 1.0]))
+    assert angles(node)[names[0]] == pytest.approx(0.5, abs=1e-9)
+    assert not node.input_counts.refused
+
+
+@pytest.mark.parametrize(('fields', 'text'), [
+    ({'name': ['left_shin'], 'position': [0.1]}, "'left_shin'; expected one of"),
+    ({'name': ['doll_3/left_shin'] * 2, 'position': [0.1, 0.2]}, 'different names'),
+    ({'name': ['doll_3/left_shin'], 'position': [0.1, 0.2]}, 'as many as names'),
+    ({'name': ['doll_3/left_shin'], 'velocity': [math.nan]}, 'joint_rates'),
+    ({'name': ['doll_2/left_shin', 'doll_3/left_shin'], 'position': [0.1, 9.0]}, 'its limits')])
+def test_wrong_joint_states_are_refused_and_change_nothing(node, fields, text):
+    before = node.simulation.state.rows.tobytes()
+    node.states.on_joint_state(JointState(**fields))
+    assert node.input_counts.refused == {'~/set_joint_states': 1}
+    assert text in node.input_counts.last_reason
+    assert node.simulation.state.rows.tobytes() == before
+
+
+def test_the_line_of_joints_in_the_reference_is_understood(make_node):
+    text = (Path(__file__).parent.parent / 'docs/reference.md').read_text()
+    block = re.search(r"pub --once /ragdoll/set_joint_states (\S+) \\\s+'([^']*)'", text)
+    assert block[1] == 'sensor_msgs/msg/JointState'
+    message, node = JointState(), make_node()
+    fill(message, yaml.safe_load(block[2]))
+    node.states.on_joint_state(message)
+    assert not node.input_counts.refused and angles(node)['left_shin'] == pytest.approx(1.2)

@@ -2,13 +2,14 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 
 import numpy as np
 import pytest
 
 from ragdoll_ros import Simulation, load_doll, load_scene
-from ragdoll_ros.model import errors
+from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene, above_ground
 from ragdoll_ros.model.shapes import Sphere
@@ -149,10 +150,14 @@ def test_events_repeat_it_to_the_bit():
                 simulation.set_state('ball', (0, 5, 1), velocity=(0, -12, 1))
             if tick == 50:
                 simulation.set_state('doll1', orientation=(1, 0, 0, 1))
-            if tick == 70:
+            if tick == 60:
+                simulation.set_state('doll1', joint_angles={'left_shin': 1 / 3},
+                                     joint_rates={'left_shin': -1 / 7})
+            if tick == 80:
                 simulation.reset(keep_time=True)
             simulation.advance()
-        assert [entry[1] for entry in log] == ['set_state', 'set_state', 'reset']
+        assert [entry[1] for entry in log] == ['set_state'] * 3 + ['reset']
+        log = [(at, name, json.loads(json.dumps(arguments))) for at, name, arguments in log]
         for tick in range(100):
             for at, name, arguments in log:
                 if at == tick:
@@ -173,4 +178,81 @@ def test_what_is_wrong_is_named_and_changes_nothing(given, error, text):
         before = state_digest(simulation.state)
         with pytest.raises(error, match=text):
             simulation.set_state(**{'doll': 'ball', 'position': (1, 1, 1), **given})
+        assert state_digest(simulation.state) == before
+
+
+def some_angles(doll, share):
+    """Each angle of a doll at a share of its range, or at 0.4 rad where it has none."""
+    return {name: pair[0] + share * (pair[1] - pair[0]) if pair else 0.4
+            for joint in doll.joints
+            for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+
+
+@pytest.mark.parametrize(('engine', 'tolerance'), [
+    ('rigid', 1e-9), ('bullet', 1e-6), ('mujoco', 1e-9)])
+def test_joint_angles_and_rates_are_set_about_the_root(engine, tolerance):
+    """Bones are where a placement with these angles has them; the root and others stay."""
+    if engine == 'mujoco':
+        pytest.importorskip('mujoco')
+    doll = load_doll('doll')
+    with Simulation(with_ball(*falling(2)), engine=engine) as simulation:
+        simulation.run(20)
+        before, excess = simulation.state.rows, simulation.energy_excess
+        angles = some_angles(doll, 0.6)
+        rates = {name: 0.1 * count for count, name in enumerate(angles)}
+        rows = simulation.set_state('doll1', joint_angles=angles, joint_rates=rates).rows
+        names = [f'doll1/{name}' for name in angles]
+        own = [simulation.scene.angle_names.index(name) for name in names]
+        assert simulation.joint_angles[own] == pytest.approx(list(angles.values()), abs=tolerance)
+        assert simulation.joint_rates[own] == pytest.approx(
+            list(rates.values()), abs=100 * tolerance)
+        first = simulation.scene.bone_slices[2].start
+        root = first + doll.bones.index(doll.root)
+        assert rows[root] == pytest.approx(before[root], abs=tolerance)
+        placed = Placement(doll, angles=angles)
+        here = simulation.state.poses(root)
+        for index, bone in enumerate(doll.bones):
+            expected = placed.bone_pose(doll.root).relative(placed.bone_pose(bone))
+            found = here.relative(simulation.state.poses(first + index))
+            assert found.position == pytest.approx(expected.position, abs=tolerance)
+            assert rotation.angle_between(found.orientation, expected.orientation) < 1e-6
+        assert rows[:first] == pytest.approx(before[:first], abs=tolerance)
+        assert abs(simulation.energy_excess - excess) < 1e-6
+        some = names[0].split('/')[1]
+        simulation.set_state('doll1', joint_angles={some: 0.0})
+        angles[some] = 0.0
+        assert simulation.joint_angles[own] == pytest.approx(list(angles.values()), abs=tolerance)
+        assert simulation.joint_rates[own] == pytest.approx(
+            list(rates.values()), abs=100 * tolerance)
+
+
+@pytest.mark.parametrize('share', [0.0, 1.0])
+def test_a_doll_that_is_folded_into_itself_does_not_burst(share):
+    """At the ends of all ranges bones overlap; in flight no energy comes of it."""
+    doll = load_doll('man')
+    scene = Scene('flying', (Placement(doll), Placement(doll, 'other', (9, 0, 0))), None)
+    with Simulation(scene) as simulation:
+        simulation.run(5)
+        other = simulation.scene.bone_slices[1]
+        with Simulation(scene) as twin:
+            simulation.set_state('man', joint_angles=some_angles(doll, share))
+            twin.run(5)
+            before = simulation.energy_excess
+            for _ in range(50):
+                state, beside = simulation.advance(), twin.advance()
+                assert (state.rows[other] == beside.rows[other]).all()
+        scale = doll.mass * GRAVITY
+        assert simulation.energy_excess < before + 1e-6 * scale
+        assert simulation.measures()['joint_gap_m'] < 1e-6
+
+
+@pytest.mark.parametrize(('given', 'error', 'text'), [
+    ({'joint_angles': {'left_sin': 0.1}}, errors.UnknownJoint, 'left_sin.*left_shin'),
+    ({'joint_rates': {'left_shin': math.inf}}, errors.NotFinite, 'joint_rates.left_shin'),
+    ({'joint_angles': {'left_shin': -9.0}}, errors.OutOfRange, 'its limits')])
+def test_wrong_joints_are_named_and_change_nothing(given, error, text):
+    with Simulation(with_ball(*falling(1))) as simulation:
+        before = state_digest(simulation.state)
+        with pytest.raises(error, match=text):
+            simulation.set_state('doll0', position=(1, 1, 1), **given)
         assert state_digest(simulation.state) == before

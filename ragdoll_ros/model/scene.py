@@ -133,7 +133,7 @@ class Placement:
         for key in ('position', 'velocity', 'spin'):
             set_fields(self, **{key: finite_floats(key, getattr(self, key))})
         for key in ('angles', 'rates'):
-            set_fields(self, **{key: _checked_angles(self.doll, key, getattr(self, key))})
+            set_fields(self, **{key: checked_angles(self.doll, key, getattr(self, key))})
         set_fields(self, name=self.name or self.doll.name, orientation=unit_vector(
             'orientation', self.orientation, 'a quaternion x, y, z, w, not zero', 4))
         if self.follow is not None and len(self.doll.bones) > 1:
@@ -181,8 +181,10 @@ class Placement:
         return bone_motions(self.doll, self.angles, self.rates)
 
 
-def _checked_angles(doll: Ragdoll, key: str, given: Mapping[str, float]) -> dict[str, float]:
-    """The ``given`` angles or rates, if the doll has them; angles within their limits."""
+def checked_angles(doll: Ragdoll, key: str, given: Mapping[str, float]) -> dict[str, float]:
+    """The ``given`` angles or rates, by the end of ``key``, rad or rad/s, rounded to 1e-9 degrees.
+    Raises UnknownJoint, NotFinite, and OutOfRange for angles outside their limits.
+    """
     limits = {name: pair for joint in doll.joints
               for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
     for name, value in given.items():
@@ -191,7 +193,8 @@ def _checked_angles(doll: Ragdoll, key: str, given: Mapping[str, float]) -> dict
             raise errors.UnknownJoint(where, name, errors.one_of(list(limits), name))
         errors.check_finite(where, value)
         lower, upper = limits[name] or (-math.inf, math.inf)
-        if key == 'angles' and not lower - LIMIT_TOLERANCE <= value <= upper + LIMIT_TOLERANCE:
+        within = lower - LIMIT_TOLERANCE <= value <= upper + LIMIT_TOLERANCE
+        if key.endswith('angles') and not within:
             raise errors.OutOfRange(
                 where, value, f'{lower:.4g} to {upper:.4g} rad, its limits: '
                 f'{math.degrees(lower):.4g} to {math.degrees(upper):.4g} degrees')

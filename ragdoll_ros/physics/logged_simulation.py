@@ -7,7 +7,7 @@ part of the log format: they do not change with the names in the code.
 """
 import dataclasses
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -103,13 +103,19 @@ class LoggedSimulation(Simulation):
 
     def set_state(self, doll: str, position: Sequence[float] | None = None,
                   orientation: Sequence[float] | None = None,
-                  velocity: Sequence[float] | None = None,
-                  spin: Sequence[float] | None = None) -> State:
+                  velocity: Sequence[float] | None = None, spin: Sequence[float] | None = None,
+                  joint_angles: Mapping[str, float] | None = None,
+                  joint_rates: Mapping[str, float] | None = None) -> State:
         given = {'position': position, 'orientation': orientation, 'velocity': velocity,
                  'spin': spin}
-        state = super().set_state(doll, **given)
-        self.on_event('set_state', {'doll': doll, **{
-            key: list(map(float, values)) for key, values in given.items() if values is not None}})
+        joints = {'joint_angles': joint_angles, 'joint_rates': joint_rates}
+        state = super().set_state(doll, **given, **joints)
+        self.on_event('set_state', {
+            'doll': doll,
+            **{key: list(map(float, values)) for key, values in given.items()
+               if values is not None},
+            **{key: {name: float(value) for name, value in values.items()}
+               for key, values in joints.items() if values}})
         return state
 
     def add(self, placement: Placement) -> State:

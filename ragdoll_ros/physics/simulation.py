@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, cast
 
@@ -15,7 +15,7 @@ from ..model.biomechanical_limits import BiomechanicalLimits
 from ..model.coordinates import GeneralizedState, changed_coordinates, placed_coordinates
 from ..model.drive import Drive
 from ..model.push import Push
-from ..model.scene import SECOND, STEP_RANGE, Placement, Scene
+from ..model.scene import SECOND, STEP_RANGE, Placement, Scene, checked_angles
 from ..model.scene_change import SceneChange
 from ..model.state import State
 from ..model.vectors import finite_floats, unit_vector
@@ -484,13 +484,16 @@ class Simulation:
 
     def set_state(self, doll: str, position: Sequence[float] | None = None,
                   orientation: Sequence[float] | None = None,
-                  velocity: Sequence[float] | None = None,
-                  spin: Sequence[float] | None = None) -> State:
-        """Set pose and velocities of a doll's root from now on; its joint angles and rates stay.
+                  velocity: Sequence[float] | None = None, spin: Sequence[float] | None = None,
+                  joint_angles: Mapping[str, float] | None = None,
+                  joint_rates: Mapping[str, float] | None = None) -> State:
+        """Set pose and velocities of a doll's root, joint angles and rates from now on; what is not
+        given stays.
 
         Simulated time continues, and other dolls go on as before. The change of energy counts as
-        work of pushes. A doll that would be deep in the ground is lifted onto it. If it has swings,
-        all swings restart at rest.
+        work of pushes. A doll that would be deep in the ground is lifted onto it. Its bones that
+        overlap at new angles do not collide until they separate. If it has swings, all swings
+        restart at rest.
 
         Args:
             doll: name of its placement in the scene.
@@ -498,11 +501,13 @@ class Simulation:
             orientation: quaternion x, y, z, w, world frame; None: as it is.
             velocity: (3,) m/s, of the root's centre of mass, world frame; None: as it is.
             spin: (3,) rad/s, world frame; None: as it is.
+            joint_angles: rad, by the doll's own names of angles; others are as they are.
+            joint_rates: rad/s, likewise.
 
         Raises:
-            UnknownDoll: the scene has no such doll.
-            NotFinite, NotUnit, WrongForm, OutOfRange: for a vector or quaternion that is none, or
-                a position that is too far away.
+            UnknownDoll, UnknownJoint: the scene has no such doll, or the doll no such angle.
+            NotFinite, NotUnit, WrongForm, OutOfRange: for a vector or quaternion that is none, a
+                position that is too far away, or an angle outside its limits.
 
         >>> simulation.set_state('doll', velocity=(0, 0, 2)).linear_velocities[0].round(6).tolist()
         [0.0, 0.0, 2.0]
@@ -518,6 +523,12 @@ class Simulation:
         if orientation is not None:
             here.q[layout.root_orientations[index]] = unit_vector(
                 'orientation', orientation, 'a quaternion x, y, z, w, not zero', 4)
+        if joint_angles:
+            here = GeneralizedState(layout.with_joint_angles(here.q, self._with_given(
+                index, 'joint_angles', joint_angles, layout.joint_angles(here.q))), here.v)
+        if joint_rates:
+            here = GeneralizedState(here.q, layout.with_joint_rates(here, self._with_given(
+                index, 'joint_rates', joint_rates, layout.joint_rates(here))))
         self._engine.set_doll(index, here)
         self._driven.hold(index, self.state, self.time)
         self._sleep_detector.restart(np.arange(len(self.scene.dolls)) == index)
@@ -644,6 +655,15 @@ class Simulation:
         if doll not in names:
             raise errors.UnknownDoll('doll', doll, errors.one_of(names, doll))
         return names.index(doll)
+
+    def _with_given(self, doll: int, key: str, given: Mapping[str, float],
+                    values: np.ndarray) -> np.ndarray:
+        """Angles or rates (k,) of all dolls with those of a doll that are given by its names."""
+        placement = self.scene.dolls[doll]
+        names = self.scene.angle_names
+        for name, value in checked_angles(placement.doll, key, given).items():
+            values[names.index(self.scene.qualified(placement, name))] = value
+        return values
 
     def _require(self, capability: Capability) -> None:
         """Raise WrongForm if the engine lacks a capability."""

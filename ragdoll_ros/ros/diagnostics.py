@@ -25,6 +25,9 @@ PERIOD = 1.0
 MIN_SPEED_RATIO = 0.95
 """Real-time factor, relative to the requested one, below which a report warns."""
 
+MOST_STALE = 3
+"""Names of driven bodies in a warning."""
+
 MOST_OVERLAPS = 4
 """Of several initial overlaps these many are named."""
 
@@ -88,7 +91,9 @@ class Diagnostics:
         self._lag = self._max_lag = 0.0
 
     def _level_and_message(self) -> tuple[bytes, str]:
-        """ERROR for bad states, WARN for refused input or lag since the last report, else OK."""
+        """ERROR for bad states, WARN for refused input or lag since the last report and for driven
+        bodies that nothing moves, else OK.
+        """
         counts, values = self._counts, self._node_values()
         requested = 0.0 if values['paused'] else values['real_time_factor']
         counted = counts.refused.total() + counts.clamped.total()
@@ -98,6 +103,10 @@ class Diagnostics:
             warnings.append(f'{values["namesakes"] + 1} nodes have this name')
         warnings += filter(None, [values['unheard_cmd_vel']])
         warnings += self._lag_warnings(requested, values)
+        if requested and (stale := self.simulation.stale_bodies):
+            warnings.append(f'nothing moves {", ".join(stale[:MOST_STALE])}'
+                            + (f' and {len(stale) - MOST_STALE} more' * (len(stale) > MOST_STALE))
+                            + ': ~/bodies/<name>/odom and cmd_vel are silent')
         bad, self._last_bad = values['bad_states'] - self._last_bad, values['bad_states']
         if bad:
             dump = values['state_dump'] and f'; the states before are in {values["state_dump"]}'

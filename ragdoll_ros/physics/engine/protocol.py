@@ -254,7 +254,8 @@ class Engine(Protocol):
     def set_doll(self, doll: int, coordinates: GeneralizedState) -> None:
         """Set the coordinates and velocities of one doll to its own in ``coordinates``, and wake
         all of its old cluster. The change of energy counts as work of pushes. If it is deeper in
-        the ground than allowed_penetration(), it is lifted onto it.
+        the ground than allowed_penetration(), it is lifted onto it. Collision is disabled between
+        its bones that overlap at new joint angles, as by set_coordinates().
         """
 
     def set_twist(self, doll: int, velocity: np.ndarray, spin: np.ndarray) -> None:

@@ -1,14 +1,16 @@
-"""The subscription that sets the state of a doll: Odometry becomes Simulation.set_state()."""
+"""Subscriptions that set states: Odometry and JointState become Simulation.set_state()."""
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 
 from ...model import errors, rotation
 from ...model.drive import MAX_SPEED
 from ...model.ragdoll import WORLD
+from ...model.scene import checked_angles
 from ...model.vectors import unit_vector
 from ...physics.simulation import Simulation
 from ..parameters.node_settings import NodeSettings
@@ -17,13 +19,18 @@ from .subscriptions import limited
 
 TOPIC = '~/set_state'
 
+JOINTS = '~/set_joint_states'
+
 
 class StateSubscription:
-    """Subscription to ~/set_state.
+    """Subscriptions to ~/set_state and ~/set_joint_states.
 
-    ``pose`` is the root's in the world frame. ``twist`` is along the root's own axes, as nav_msgs
-    defines it for ``child_frame_id``, the name of the doll. Covariances are ignored. ``after`` is
-    called when a state has been set.
+    The former: ``pose`` is the root's in the world frame. ``twist`` is along the root's own axes,
+    as nav_msgs defines it for ``child_frame_id``, the name of the doll. Covariances are ignored.
+    The latter: names, positions and velocities as on joint_states, of any joints of any dolls;
+    positions or velocities may be left out, efforts are ignored.
+
+    ``after`` is called when a state has been set.
     """
 
     def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None]) -> None:
@@ -31,6 +38,7 @@ class StateSubscription:
         self.simulation: Simulation
         self.settings: NodeSettings
         node.create_subscription(Odometry, TOPIC, self.on_odometry, 10)
+        node.create_subscription(JointState, JOINTS, self.on_joint_state, 10)
 
     def on_odometry(self, message: Odometry) -> None:
         """Set pose and velocities of a doll; a message that is wrong is refused and counted."""
@@ -40,6 +48,41 @@ class StateSubscription:
             self._counts.refuse(TOPIC, error)
         else:
             self._after()
+
+    def on_joint_state(self, message: JointState) -> None:
+        """Set joint angles and rates; a message that is wrong is refused and counted."""
+        try:
+            self._set_joints(message)
+        except errors.ModelError as error:
+            self._counts.refuse(JOINTS, error)
+        else:
+            self._after()
+
+    def _set_joints(self, message: JointState) -> None:
+        """Doll by doll; all of the message is checked before any is set."""
+        names, scene = list(message.name), self.simulation.scene
+        if len(set(names)) < len(names):
+            raise errors.WrongForm('name', names, 'different names')
+        values = {}
+        for key, numbers in (('joint_angles', message.position), ('joint_rates', message.velocity)):
+            if len(numbers) not in (0, len(names)):
+                raise errors.WrongForm('position' if key == 'joint_angles' else 'velocity',
+                                       len(numbers), f'as many as names, {len(names)}, or none')
+            values[key] = dict(zip(names, numbers, strict=False))
+        given = []
+        for placement in scene.dolls:
+            own = {scene.qualified(placement, name): name
+                   for joint in placement.doll.joints for name in joint.angle_names}
+            fields = {key: checked_angles(placement.doll, key, {
+                own[name]: value for name, value in each.items() if name in own})
+                for key, each in values.items()}
+            names = [name for name in names if name not in own]
+            if any(fields.values()):
+                given.append((placement.name, fields))
+        if names:
+            raise errors.UnknownJoint('name', names[0], errors.one_of(scene.angle_names, names[0]))
+        for doll, fields in given:
+            self.simulation.set_state(doll, **fields)
 
     def _set(self, message: Odometry) -> None:
         frame = message.header.frame_id

@@ -17,7 +17,7 @@ from ...kernels.cluster_state import IMPACT, LEDGER, STEP_STATS, ClusterState, m
 from ...kernels.compiling.bundle import bind
 from ...kernels.contact_kind import LIMIT
 from ...kernels.loaded import advance as kernels
-from ...kernels.system import System
+from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING, System
 from ...kernels.workspace import Workspace, make_workspace
 from ..protocol import GROUND, Impacts
 from .broad_phase import NO_PAIRS
@@ -253,6 +253,17 @@ class Clusters:
         """Set the exclusion flags (p,) of each doll's pairs of geoms; see kernels/system.py."""
         for cluster, own in zip(self._singles, flags, strict=True):
             cluster.state.excluded[:] = own
+
+    def exclude_overlaps(self, doll: int) -> None:
+        """Exclude those pairs of geoms of a doll that overlap in its next state, until they
+        separate, and those that only a joint outside its limits brings together.
+        """
+        cluster, single = self.members[self.of_doll[doll]], self._singles[doll]
+        before = sum(len(self._singles[other].state.excluded)
+                     for other in itertools.takewhile(lambda other: other != doll, cluster.dolls))
+        for state, at in ((single.state, 0), (cluster.state, before)):
+            state.excluded[at:at + len(single.state.excluded)] |= (
+                OVERLAPPING | JOINT_OUTSIDE_LIMITS)
 
     def excluded(self, kind: int) -> list[np.ndarray]:
         """Flags (p,) of each doll's pairs: of ``kind``, OVERLAPPING or JOINT_OUTSIDE_LIMITS."""

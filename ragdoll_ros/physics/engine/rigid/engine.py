@@ -124,6 +124,9 @@ class RigidEngine:
     def set_doll(self, doll: int, coordinates: GeneralizedState) -> None:
         clusters, before = self._clusters, self.doll_totals.energy
         self._wake(self.cluster_of_doll == self.cluster_of_doll[doll])
+        joints = slice(self.layout.doll_q[doll].start + 7, self.layout.doll_q[doll].stop)
+        if (clusters.q[joints] != coordinates.q[joints]).any():
+            clusters.exclude_overlaps(doll)
         clusters.set_doll(doll, coordinates.q, self._in_root_axes(coordinates))
         self._refresh()
         self._lift_out_of_ground([doll])

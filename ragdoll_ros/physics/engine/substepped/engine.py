@@ -99,9 +99,13 @@ class SubsteppedEngine(ABC):
         q, v = here.q.copy(), here.v.copy()
         q[self.layout.doll_q[doll]] = coordinates.q[self.layout.doll_q[doll]]
         v[self.layout.doll_v[doll]] = coordinates.v[self.layout.doll_v[doll]]
+        joints = slice(self.layout.doll_q[doll].start + 7, self.layout.doll_q[doll].stop)
+        moved = (here.q[joints] != q[joints]).any()
         self.sleeping[:] = False
         self._set_state(GeneralizedState(q, v))
         self._lift_out_of_ground([doll])
+        if moved:
+            self._exclude_overlaps()
         self._account.add_work(doll, self.doll_totals.energy.sum() - before, by_hand=False)
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),

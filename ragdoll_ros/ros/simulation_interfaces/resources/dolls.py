@@ -1,12 +1,13 @@
 """Dolls that are spawned: of our YAML, of a robot's URDF, or fitted to a rigged character."""
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 from ....files import yaml_text
-from ....files.config import find
+from ....files.config import config_folder, find
 from ....files.scene import load_scene, scene_from_data
 from ....model.errors import RagdollError
 from ....model.scene import Placement
@@ -22,6 +23,10 @@ CHARACTERS = ('.glb', '.gltf', '.vrm')
 """Ends of the names of files."""
 
 SPAWN_FORMATS = ('yaml', 'urdf', 'gltf')
+
+
+MOST_KEPT = 16
+"""Files in config/ whose dolls are kept."""
 
 
 class Found(NamedTuple):
@@ -47,7 +52,20 @@ def _of_file(uri: str) -> Found:
     name = scene_of(uri, '', UNSUPPORTED_FORMAT, (*YAML, *URDF, *CHARACTERS))
     read: Callable[[Path], Found] | None = _robot if name.lower().endswith(URDF) else (
         _character if name.lower().endswith(CHARACTERS) else None)
-    return _one(load_scene(name).dolls) if read is None else read(find(name))
+    if read is not None:
+        return read(find(name))
+    path = find(name)
+    if path.parent == config_folder():
+        return _one(_shipped(str(path), path.stat().st_mtime_ns))
+    return _one(load_scene(name).dolls)
+
+
+@functools.lru_cache(MOST_KEPT)
+def _shipped(path: str, _: int) -> tuple[Placement, ...]:
+    """The dolls of a file in config/ that was changed at this time, read once: reading takes the
+    interpreter from the ticks for longer than spawning does.
+    """
+    return load_scene(path).dolls
 
 
 def _of_text(text: str) -> Found:
