@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from .model.drive import Drive as Drive
     from .model.errors import RagdollError as RagdollError
     from .model.follow import Follow as Follow
+    from .model.mesh import HeightField as HeightField
+    from .model.mesh import Mesh as Mesh
     from .model.push import Push as Push
     from .model.ragdoll import Bone as Bone
     from .model.ragdoll import Joint as Joint
@@ -42,7 +44,8 @@ if TYPE_CHECKING:
 _MODULES = {
     'Bone': 'model.ragdoll', 'Box': 'model.shapes', 'Capsule': 'model.shapes',
     'Compound': 'model.compound', 'Cylinder': 'model.shapes', 'Drive': 'model.drive',
-    'Follow': 'model.follow', 'Ground': 'model.scene', 'Joint': 'model.ragdoll',
+    'Follow': 'model.follow', 'Ground': 'model.scene',
+    'HeightField': 'model.mesh', 'Joint': 'model.ragdoll', 'Mesh': 'model.mesh',
     'Part': 'model.shapes', 'Placement': 'model.scene', 'Push': 'model.push',
     'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
     'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',

@@ -7,6 +7,7 @@ from pathlib import Path
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange, WrongForm
 from ..model.follow import Follow
+from ..model.mesh import Surface
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.rotation import IDENTITY
@@ -17,6 +18,7 @@ from .doll import build_shape, shape_data
 from .repeat import Placed, repeated
 from .robots.robot_bodies import OPTIONS, PARSERS, PlacedRobot, read_robot
 from .schema import entries, has_error_under, try_build
+from .surfaces import build_surface, surface_data, surface_kind
 
 MOST_BODIES = 100_000
 
@@ -47,7 +49,7 @@ def build_bodies(data: dict, folder: Path,
         elif _moves(entry):
             loose += _copies(try_build(found, where, _loose_body, entry), entry)
         else:
-            static += _copies(try_build(found, where, _static_body, entry), entry)
+            static += _copies(try_build(found, where, _static_body, entry, folder), entry)
         if len(static) + len(loose) > MOST_BODIES:
             found.append(OutOfRange(where, len(static) + len(loose),
                                     f'at most {MOST_BODIES} bodies in all'))
@@ -72,7 +74,8 @@ def body_data(body: StaticBody) -> dict:
                 'friction': body.friction, 'rolling_friction': body.rolling_friction,
                 'restitution': body.restitution,
                 'color': None if body.color is None else list(body.color)}
-    return {'name': body.name, **shape_data(body.shape), 'position': list(body.position),
+    shape = surface_data if isinstance(body.shape, Surface) else shape_data
+    return {'name': body.name, **shape(body.shape), 'position': list(body.position),
             **{key: value for key, value in optional.items() if value is not None}}
 
 
@@ -96,19 +99,23 @@ def _moves(entry: dict) -> bool:
     return 'mass' in entry or 'follow' in entry
 
 
-def _static_body(entry: dict) -> StaticBody:
+def _static_body(entry: dict, folder: Path) -> StaticBody:
     for key in MOTION:
         if key in entry:
             raise WrongForm(key, entry[key], 'a mass as well: a body without one never moves')
     _check_options(entry)
     fields = {key: value for key, value in entry.items()
               if key not in ('shape', 'shapes', 'repeat')}
-    return StaticBody(shape=build_shape(entry), **fields)
+    shape = build_surface(entry, folder) if surface_kind(entry) else build_shape(entry)
+    return StaticBody(shape=shape, **fields)
 
 
 def _loose_body(entry: dict) -> Placement:
     """A doll of one bone: a uniform solid, its frame that of the body's shape."""
     _check_options(entry)
+    if kind := surface_kind(entry):
+        key = 'mass' if 'mass' in entry else 'follow'
+        raise WrongForm(key, entry[key], f'none: a {kind} never moves')
     shape, follow = build_shape(entry), follow_of(entry)
     if 'mass' not in entry and follow and not follow.is_exact:
         raise WrongForm('follow', entry['follow'], 'a mass as well, which the force moves')

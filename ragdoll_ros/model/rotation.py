@@ -104,22 +104,22 @@ def rotate(q: ArrayLike, v: ArrayLike) -> np.ndarray:
 
 
 def from_matrix(r: ArrayLike) -> np.ndarray:
-    """Unit quaternion (4,) of one rotation matrix (3, 3); w >= 0.
+    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3); w >= 0.
 
     Starts from the largest component, for accuracy (Shepperd 1978).
     """
-    r = np.asarray(r, float)
-    trace = np.trace(r)
+    r = np.moveaxis(np.asarray(r, float), (-2, -1), (0, 1))
+    trace = r[0, 0] + r[1, 1] + r[2, 2]
     squares = np.array([1 + 2 * r[0, 0] - trace, 1 + 2 * r[1, 1] - trace,
                         1 + 2 * r[2, 2] - trace, 1 + trace])
-    largest = int(np.argmax(squares))
     rows = np.array([
         [squares[0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]],
         [r[0, 1] + r[1, 0], squares[1], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]],
         [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[2], r[1, 0] - r[0, 1]],
         [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], squares[3]]])
-    q = normalized(rows[largest])
-    return q if q[3] >= 0 else -q
+    largest = np.argmax(squares, axis=0)[None, None]
+    q = normalized(np.moveaxis(np.take_along_axis(rows, largest, axis=0)[0], 0, -1))
+    return np.where(q[..., 3:] >= 0, q, -q)
 
 
 def from_axis_angle(axis: ArrayLike, angle: float) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 from . import errors
 from .compound import Compound
 from .errors import set_fields
+from .mesh import Surface
 from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Part, Shape, Solid
@@ -22,7 +23,7 @@ class StaticBody:
 
     Args:
         name: unique among bodies and dolls of the scene.
-        shape: a Sphere, Box, Cylinder, Capsule, or a Compound of them.
+        shape: a Sphere, Box, Cylinder, Capsule, a Compound of them, a HeightField or a Mesh.
         position: (3,) m, of the shape's origin.
         orientation: quaternion x, y, z, w, shape's axes to world axes; normalised.
         friction: Coulomb's coefficient, 0 or more; None: that of the scene's material.
@@ -39,7 +40,7 @@ class StaticBody:
     """
 
     name: str
-    shape: Shape | Compound
+    shape: Shape | Compound | Surface
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Quaternion = IDENTITY
     friction: float | None = None
@@ -51,8 +52,9 @@ class StaticBody:
         set_fields(self, position=finite_floats('position', self.position),
                    orientation=unit_vector('orientation', self.orientation,
                                            'a quaternion x, y, z, w, not zero', 4))
-        if not isinstance(self.shape, Solid | Compound):
-            raise errors.WrongForm('shape', self.shape, 'a shape, or a Compound of shapes')
+        if not isinstance(self.shape, Solid | Compound | Surface):
+            raise errors.WrongForm('shape', self.shape,
+                                   'a shape, a Compound of shapes, or a surface')
         check_surface(self, max_rolling_friction=1e6)
 
     @property

@@ -14,6 +14,7 @@ from ..model import errors
 from ..model.biomechanical_limits import BiomechanicalLimits
 from ..model.coordinates import GeneralizedState, changed_coordinates, placed_coordinates
 from ..model.drive import Drive
+from ..model.mesh import Surface
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Placement, Scene, checked_angles
 from ..model.scene_change import SceneChange
@@ -65,7 +66,8 @@ class Simulation:
     Raises:
         OutOfRange: step, accuracy, engine or workers is not valid.
         MissingEngine: the engine's library is not installed or does not work.
-        WrongForm: a joint has passive torques, or a body follows, and the engine is not rigid.
+        WrongForm: a joint has passive torques, or a body follows or is a mesh or a height field,
+            and the engine is not rigid.
 
     Example:
         >>> from ragdoll_ros import Push, Simulation, load_scene
@@ -812,6 +814,8 @@ def _needed(scene: Scene) -> Iterator[Capability]:
         yield Capability.PASSIVE_TORQUES
     if any(placement.follow for placement in scene.dolls):
         yield Capability.DRIVEN_BODIES
+    if any(isinstance(body.shape, Surface) for body in scene.bodies):
+        yield Capability.SURFACES
 
 
 def _swings(scene: Scene) -> SwingSimulation | None:

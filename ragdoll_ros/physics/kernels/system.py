@@ -12,13 +12,14 @@ GEOM = np.dtype([
     ('body', np.int64), ('kind', np.int64), ('size', float, 3), ('position', float, 3),
     ('orientation', float, 4), ('bounding_radius', float), ('reach', float), ('friction', float),
     ('rolling_friction', float), ('restitution', float), ('first_point', np.int64),
-    ('point_count', np.int64)], align=True)
+    ('point_count', np.int64), ('edges', float, 3)], align=True)
 """A convex shape of a body, or of the WORLD. ``kind`` and ``size``: see collision/shapes.py.
 ``position``, m, and ``orientation``: of the shape's center and axes from the body's center of mass,
 along the doll's axes in the bind pose; of static ones in the world. ``bounding_radius``: of the
 sphere around it; ``reach``: from the body's center of mass to its farthest point, m. ``friction``,
 ``rolling_friction`` (m) and ``restitution``: against the ground. ``first_point``, ``point_count``:
-its own among all points that may touch the ground."""
+its own among all points that may touch the ground. ``edges``: of a triangle, see
+collision/triangles/triangle.py."""
 
 GEOM_PAIR = np.dtype([
     ('a', np.int64), ('b', np.int64), ('friction', float), ('rolling_friction', float),

@@ -9,6 +9,7 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from ...model import rotation, static_body
+from ...model.mesh import Surface
 from ...model.pose import Pose
 from ...model.push import Push
 from ...model.ragdoll import DEFAULT_COLOR, Ragdoll
@@ -24,6 +25,9 @@ RED = (0.9, 0.2, 0.1, 1.0)
 BROWN = (0.35, 0.2, 0.1, 1.0)
 ROD_WIDTH = 0.01
 """m: line width of the swings' rods."""
+
+SURFACE_PERIOD = 100
+"""Messages from one with the surfaces to the next: they never move, and may be large."""
 
 MARKER_TYPES = {'box': Marker.CUBE, 'sphere': Marker.SPHERE, 'cylinder': Marker.CYLINDER}
 
@@ -45,21 +49,26 @@ class SceneMarkers:
         self._static = [(body, part) for body in scene.bodies for part in body.primitives]
         self._static_poses = np.array([(*part.position, *part.orientation)
                                        for _, part in self._static]).reshape(-1, 7)
-        self._arrow_count = 0
-        self._is_first = True
+        self._surfaces = [body for body in scene.bodies if isinstance(body.shape, Surface)]
+        self._arrow_count = self._message_count = 0
 
     def serialize(self, stamp: int, state: State, pushes: Sequence[Push],
                   swings: SwingState | None = None) -> bytes:
         """Serialized MarkerArray of a state; ``stamp`` in ns. Deletes arrows of ended pushes.
 
-        The first message deletes all markers of the last scene.
+        The first message deletes all markers of the last scene. It has the surfaces, and each
+        hundredth after it.
         """
         poses = np.concatenate([np.concatenate(
             state.poses(self._bones).compose(self._part_poses), axis=1), self._static_poses])
         ends = np.zeros((0, 3)) if swings is None else np.stack(
             [swings.roots, swings.positions], axis=1).reshape(-1, 3)
-        template = self._make_template(first=True) if self._is_first else self._template
-        self._is_first = False
+        template = self._template
+        if self._message_count == 0:
+            template = self._make_template(first=True, surfaces=True)
+        elif self._surfaces and self._message_count % SURFACE_PERIOD == 0:
+            template = self._template_with_surfaces
+        self._message_count += 1
         return append_markers(template.serialize(stamp, poses, ends),
                               self._push_markers(stamp, pushes, state))
 
@@ -67,13 +76,19 @@ class SceneMarkers:
     def _template(self) -> SerializedTemplate:
         return self._make_template()
 
-    def _make_template(self, first: bool = False) -> SerializedTemplate:
+    @cached_property
+    def _template_with_surfaces(self) -> SerializedTemplate:
+        return self._make_template(surfaces=True)
+
+    def _make_template(self, first: bool = False, surfaces: bool = False) -> SerializedTemplate:
         """Template of the bones' parts, poses (p, 7), and of the rods, end points (2 m, 3) m."""
         header, scene = to_header(STAMP_SENTINEL, self._frame), self._scene
         array = MarkerArrayBuilder()
         if first:
             array.append('all', '', lambda _: (
                 [Marker(header=header, action=Marker.DELETEALL)], np.zeros((1, 0))))
+        if surfaces and self._surfaces:
+            array.append('surfaces', '', lambda _: _surface_markers(header, self._surfaces))
         poses = [array.append(id(placement.doll), scene.qualified(placement, ''),
                               partial(_part_markers, header, placement.doll))
                  for placement in scene.dolls]
@@ -135,6 +150,22 @@ def _static_markers(header: Header, parts: Sequence[tuple[static_body.StaticBody
         set_color(marker, body.color or static_body.DEFAULT_COLOR)
         markers.append(marker)
     return markers, poses
+
+
+def _surface_markers(header: Header, bodies: Sequence[static_body.StaticBody]
+                     ) -> tuple[list[Marker], np.ndarray]:
+    """Markers of static bodies that are surfaces, with nothing that changes."""
+    markers = []
+    for body in bodies:
+        vertices, faces = body.shape.mesh()
+        points = [to_point(vertex) for vertex in vertices]
+        marker = Marker(header=header, ns=f'bodies/{body.name}', type=Marker.TRIANGLE_LIST,
+                        action=Marker.ADD, pose=to_pose((*body.position, *body.orientation)),
+                        scale=to_vector((1.0, 1.0, 1.0)))
+        marker.points = [points[index] for index in faces.ravel().tolist()]
+        set_color(marker, body.color or static_body.DEFAULT_COLOR)
+        markers.append(marker)
+    return markers, np.zeros((len(markers), 0))
 
 
 def _rod_marker(header: Header, ends: np.ndarray) -> tuple[list[Marker], np.ndarray]:

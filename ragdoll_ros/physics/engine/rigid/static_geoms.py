@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....model import rotation
+from ....model.mesh import Surface
 from ....model.scene import Scene
 from ....model.scene_change import SceneChange
 from ....model.shapes import Part, support_distance
@@ -14,6 +15,7 @@ from ...kernels.dynamics.body import WORLD
 from ...kernels.loaded import aabb_tree
 from ...kernels.system import GEOM
 from .build_system import bounding_radius, geom_size
+from .triangle_geoms import triangle_geoms
 
 LOOK_AHEAD = 0.1
 """s: what a bone may touch within this time is given to its cluster, when it has to be made anew;
@@ -30,23 +32,26 @@ class StaticGeoms:
     """
 
     def __init__(self, scene: Scene, reach: np.ndarray) -> None:
-        parts = [(body, part) for body in scene.bodies for part in body.parts]
-        self.geoms = np.zeros(len(parts), GEOM)
-        self.laws = np.zeros((len(parts), 3))
-        """(g, 3): friction, rolling friction, m, and restitution of each geom."""
-        place = {body.name: index for index, body in enumerate(scene.bodies)}
-        self.bodies = np.array([place[body.name] for body, _ in parts], np.int64)
+        surfaces = [(index, body) for index, body in enumerate(scene.bodies)
+                    if isinstance(body.shape, Surface)]
+        parts = [(index, part) for index, body in enumerate(scene.bodies) for part in body.parts]
+        own = [_primitive_geoms([part for _, part in parts]),
+               *(triangle_geoms(body.shape.triangles, body.pose) for _, body in surfaces)]
+        self.geoms = np.concatenate([geoms for geoms, _, _ in own])
+        """(g,): of primitive shapes, then triangles of surfaces."""
+        self.bodies = np.concatenate([np.array([index for index, _ in parts], np.int64), *(
+            np.full(len(geoms), index) for (index, _), (geoms, _, _) in zip(
+                surfaces, own[1:], strict=True))])
         """(g,): index of each geom's body in the scene's bodies."""
-        for k, (geom, (body, part)) in enumerate(zip(self.geoms, parts, strict=True)):
-            geom['body'], geom['kind'] = WORLD, SHAPE_KIND[part.kind]
-            geom['size'] = geom_size(part.shape)
-            geom['position'], geom['orientation'] = part.position, part.orientation
-            geom['bounding_radius'] = bounding_radius(part.shape)
-            self.laws[k] = scene.material.on(body)
-        self._tree = _make_tree([part for _, part in parts]) if parts else None
+        laws = np.array([scene.material.on(body) for body in scene.bodies]).reshape(-1, 3)
+        self.laws = laws[self.bodies]
+        """(g, 3): friction, rolling friction, m, and restitution of each geom."""
+        self._tree = aabb_tree.make_aabb_tree(
+            *(np.concatenate([box[side] for _, *box in own]) for side in range(2))
+        ) if len(self.geoms) else None
         self._reach = np.ascontiguousarray(reach)
         self._doll_of_bone = scene.doll_of_bone
-        self._first_keys = len(parts) * np.array(
+        self._first_keys = len(self.geoms) * np.array(
             [*(own.start for own in scene.bone_slices), len(scene.bones)])
         self._found = np.zeros(4 * len(scene.bones), np.int64)
         self._keys = NO_KEYS
@@ -119,11 +124,21 @@ class StaticGeoms:
         return np.sort(self._found[:count])
 
 
-def _make_tree(parts: Sequence[Part]) -> object:
-    """The tree of the bounding boxes of ``parts`` at their poses in the world."""
+Geoms = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""GEOM (g,), and the lower and the upper corners (g, 3) m of their bounding boxes."""
+
+
+def _primitive_geoms(parts: Sequence[Part]) -> Geoms:
+    """Geoms of primitive shapes at their poses in the world."""
+    geoms = np.zeros(len(parts), GEOM)
+    for geom, part in zip(geoms, parts, strict=True):
+        geom['body'], geom['kind'] = WORLD, SHAPE_KIND[part.kind]
+        geom['size'] = geom_size(part.shape)
+        geom['position'], geom['orientation'] = part.position, part.orientation
+        geom['bounding_radius'] = bounding_radius(part.shape)
+    if not parts:
+        return geoms, np.zeros((0, 3)), np.zeros((0, 3))
     terms = np.array([part.shape.support_terms for part in parts])
     # Row i of a rotation matrix is the world's axis i in the part's frame.
-    axes = rotation.matrix([part.orientation for part in parts])
-    half = support_distance(terms[:, None], axes)
-    center = np.array([part.position for part in parts])
-    return aabb_tree.make_aabb_tree(center - half, center + half)
+    half = support_distance(terms[:, None], rotation.matrix(geoms['orientation']))
+    return geoms, geoms['position'] - half, geoms['position'] + half

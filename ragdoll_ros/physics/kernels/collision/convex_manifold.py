@@ -52,8 +52,8 @@ def _contact_axis(a: Shape, b: Shape, c: Vec3, margin: float) -> Axis:
 def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
     """Write the manifold of two boxes or cylinders; arguments and return value as collide()."""
     origin = b.position
-    a = Shape(a.kind, a.size, sub(a.position, origin), a.rotation)
-    b = Shape(b.kind, b.size, (0.0, 0.0, 0.0), b.rotation)
+    a = Shape(a.kind, a.size, sub(a.position, origin), a.rotation, a.edges)
+    b = Shape(b.kind, b.size, (0.0, 0.0, 0.0), b.rotation, b.edges)
     s, n = _contact_axis(a, b, a.position, margin)
     if s > margin:
         return 0
@@ -68,7 +68,8 @@ def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> 
     if cosine >= FACE_COSINE:
         count = _clip_faces(incident, reference, n, sign, scratch)
     else:
-        count = _clip_edges(a, b, n, points)
+        middle, u, other, v = supporting_edges(a, b, n)
+        count = clip_edges(middle, u, other, v, n, points)
     least = math.inf
     for i in range(count):
         least = min(least, points[i].gap)
@@ -78,7 +79,8 @@ def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> 
             vertex = add(incident.position, support_point(incident, scale(-sign, n)))
             middle = add_scaled(vertex, -(sign * s / 2), n)
         else:
-            middle = _closest_on_edges(a, b, n, s)
+            middle, u, other, v = supporting_edges(a, b, n)
+            middle = closest_on_edges(middle, u, other, v, n, s)
         put(points[count].point, middle)
         points[count].gap, points[count].feature_id = s, CLOSEST_POINTS_ID
         count += 1
@@ -125,11 +127,21 @@ def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
 
 
 @compiled
-def _clip_edges(a: Shape, b: Shape, n: Vec3, points: np.ndarray) -> int:
-    """Write the ends of the overlap of parallel supporting edges, seen along n; 2, or 0 if none."""
+def supporting_edges(a: Shape, b: Shape, n: Vec3) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+    """The edges, or lines of sides, of a and b that support along n: their middles, m, from b's
+    center, and half of each.
+    """
     middle, u = supporting_edge(a, neg(n))
     other, v = supporting_edge(b, n)
-    offset = sub(add(middle, a.position), other)
+    return add(middle, a.position), u, other, v
+
+
+@compiled
+def clip_edges(middle: Vec3, u: Vec3, other: Vec3, v: Vec3, n: Vec3, points: np.ndarray) -> int:
+    """Write the ends of the overlap of parallel edges, seen along n; 2, or 0 if none. Arguments as
+    supporting_edges() returns them.
+    """
+    offset = sub(middle, other)
     rise, other_rise = dot(u, n), dot(v, n)
     uu, vv = dot(u, u) - rise * rise, dot(v, v) - other_rise * other_rise
     uv = dot(u, v) - rise * other_rise
@@ -153,11 +165,8 @@ def _clip_edges(a: Shape, b: Shape, n: Vec3, points: np.ndarray) -> int:
 
 
 @compiled
-def _closest_on_edges(a: Shape, b: Shape, n: Vec3, s: float) -> Vec3:
-    """Midpoint, m, from b's center, of the closest points of the supporting edges or vertices."""
-    middle, u = supporting_edge(a, neg(n))
-    other, v = supporting_edge(b, n)
-    middle = add(middle, a.position)
+def closest_on_edges(middle: Vec3, u: Vec3, other: Vec3, v: Vec3, n: Vec3, s: float) -> Vec3:
+    """Midpoint, m, of the closest points of edges or vertices that are s apart along n."""
     offset = sub(other, middle)
     rise, other_rise, height = dot(u, n), dot(v, n), dot(offset, n)
     uu, vv = dot(u, u) - rise * rise, dot(v, v) - other_rise * other_rise

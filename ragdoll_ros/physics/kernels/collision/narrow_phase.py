@@ -1,7 +1,8 @@
 """Narrow phase: contact manifold and separation of two shapes.
 
 Spheres and capsules are cores with a radius (capsule_manifold.py); boxes and cylinders have
-separating axes (separating_axis.py) and faces that are clipped (convex_manifold.py).
+separating axes (separating_axis.py) and faces that are clipped (convex_manifold.py). Triangles, of
+static surfaces, limit the normals at their edges (triangles/); a triangle is always shape b.
 """
 from __future__ import annotations
 
@@ -12,7 +13,9 @@ from ..maths.vectors import dot, sub
 from .capsule_manifold import capsule_manifold, capsule_separation
 from .convex_manifold import convex_manifold
 from .separating_axis import max_separation_axis
-from .shapes import CAPSULE, Shape, bounding_radius
+from .shapes import CAPSULE, TRIANGLE, Shape, bounding_radius
+from .triangles.limited_axis import triangle_separation
+from .triangles.triangle_manifold import triangle_manifold
 
 
 @compiled
@@ -25,6 +28,8 @@ def collide(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
     reach = bounding_radius(a) + bounding_radius(b) + margin
     if dot(c, c) > reach * reach:
         return 0
+    if b.kind == TRIANGLE:
+        return triangle_manifold(a, b, margin, manifold)
     sign = 1.0
     if b.kind <= CAPSULE < a.kind:
         a, b, sign = b, a, -1.0
@@ -42,6 +47,8 @@ def separation(a: Shape, b: Shape, cutoff: float) -> float:
     Disjoint shapes: the distance, of two boxes the largest separation along an axis of SAT.
     Overlapping shapes: minus the penetration depth.
     """
+    if b.kind == TRIANGLE:
+        return triangle_separation(a, b)
     if b.kind <= CAPSULE < a.kind:
         a, b = b, a
     if a.kind <= CAPSULE:

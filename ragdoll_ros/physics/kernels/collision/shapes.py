@@ -2,7 +2,8 @@
 
 Kinds and sizes, m: sphere (radius, 0, 0); capsule (radius, half length of its axis, 0); box (half
 extents); cylinder (radius, half length, 0). The axis of a capsule or cylinder is its own z axis.
-All are symmetric about their centre, so that their support functions are even.
+These are symmetric about their centre, so that their support functions are even. A triangle, of a
+static surface, is not, and has functions of its own: see triangles/triangle.py.
 """
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..maths.vectors import Vec3, divide, norm, to_local, to_world, vec
 
-SPHERE, CAPSULE, BOX, CYLINDER = 0, 1, 2, 3
+SPHERE, CAPSULE, BOX, CYLINDER, TRIANGLE = 0, 1, 2, 3, 4
 """Kinds of shapes. Spheres and capsules, which are a core with a radius, come first."""
 
 SHAPE_KIND = {'sphere': SPHERE, 'capsule': CAPSULE, 'box': BOX, 'cylinder': CYLINDER}
@@ -22,18 +23,21 @@ SHAPE_KIND = {'sphere': SPHERE, 'capsule': CAPSULE, 'box': BOX, 'cylinder': CYLI
 
 
 class Shape(NamedTuple):
-    """A shape at a pose: kind, size, centre (m, world), rotation matrix (3, 3) to the world."""
+    """A shape at a pose: kind, size, centre (m, world), rotation matrix (3, 3) to the world, and
+    the edges of a triangle.
+    """
 
     kind: int
     size: Vec3
     position: Vec3
     rotation: np.ndarray
+    edges: Vec3 = (0.0, 0.0, 0.0)
 
 
 @compiled
 def shape_at(geom: np.record, position: np.ndarray, rotation: np.ndarray) -> Shape:
     """The shape of a geom whose centre (3,), m, and rotation (3, 3) in the world are given."""
-    return Shape(geom.kind, vec(geom.size), vec(position), rotation)
+    return Shape(geom.kind, vec(geom.size), vec(position), rotation, vec(geom.edges))
 
 
 @compiled
@@ -44,6 +48,10 @@ def bounding_radius(shape: Shape) -> float:
         return norm(size)
     if shape.kind == CYLINDER:
         return math.sqrt(size[0] * size[0] + size[1] * size[1])
+    if shape.kind == TRIANGLE:
+        x, length, y = size
+        widest = max(x * x, (x + length) * (x + length)) + y * y / 4
+        return math.sqrt(max(widest, (2 * x + length) * (2 * x + length) + y * y))
     return size[0] + size[1]
 
 
@@ -62,9 +70,13 @@ def core_extent(shape: Shape, n: Vec3) -> float:
 
 @compiled
 def extent(shape: Shape, n: Vec3) -> float:
-    """Half-width, m, of a shape along the unit vector n (world): its support function."""
+    """Half-width, m, of a shape along the unit vector n (world): its support function; of a
+    triangle the radius of its bounding sphere, which is more.
+    """
     if shape.kind == SPHERE:
         return shape.size[0]
+    if shape.kind == TRIANGLE:
+        return bounding_radius(shape)
     reach = core_extent(shape, n)
     return reach + shape.size[0] if shape.kind == CAPSULE else reach
 

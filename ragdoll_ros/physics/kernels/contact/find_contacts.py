@@ -6,7 +6,8 @@ import math
 import numpy as np
 
 from ..collision.narrow_phase import collide
-from ..collision.shapes import CYLINDER
+from ..collision.shapes import CYLINDER, TRIANGLE
+from ..collision.triangles.triangle_manifold import ON_FACE
 from ..compiling.decorators import compiled
 from ..contact_kind import FRICTIONAL, LIMIT, ROLLING
 from ..dynamics.body import WORLD
@@ -20,6 +21,9 @@ from .placed_shape import placed_shape
 
 IDS_PER_PAIR = 4096
 """Range of ids that the points of one pair have."""
+
+SAME_DIRECTION = 1e-3
+"""Triangles whose normals differ by less along x and y may count as of one plane."""
 
 
 @compiled
@@ -96,6 +100,8 @@ def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m:
         c, at = contacts.found[m], contacts.manifold[j]
         c.kind = ROLLING if pair.rolling_friction > 0 else FRICTIONAL
         c.body_a, c.body_b, c.id = a.body, b.body, first_id + at.feature_id
+        if b.kind == TRIANGLE and at.feature_id < ON_FACE:
+            c.id = id_on_plane(s, pair.a, vec(at.normal), at.feature_id)
         c.patch = len(s.geoms) + k
         put(c.point, vec(at.point))
         put(c.normal, vec(at.normal))
@@ -103,6 +109,17 @@ def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m:
         c.restitution = pair.restitution
         m += 1
     return m
+
+
+@compiled
+def id_on_plane(s: System, a: int, n: Vec3, vertex: int) -> int:
+    """Id of the contact of a vertex of geom ``a`` with a face of normal n, the same on all
+    triangles of a plane: what slides from one to the next persists. It is below 0, as no other is.
+    """
+    x, y = round(n[0] / SAME_DIRECTION), round(n[1] / SAME_DIRECTION)
+    size = round(2 / SAME_DIRECTION) + 1
+    plane = (x * size + y) * 2 + (1 if n[2] > 0 else 0)
+    return -1 - ((plane + size * size) * len(s.geoms) + a) * ON_FACE - vertex
 
 
 @compiled

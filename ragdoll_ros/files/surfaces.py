@@ -1,0 +1,126 @@
+"""Surfaces of static bodies: height fields from numbers, .npy and pictures; meshes from files."""
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..model import errors
+from ..model.mesh import SURFACES, HeightField, Mesh, Surface
+from ..model.vectors import Vector, floats
+from .config import config_folder
+from .robots.mesh_file import find_file, read_mesh
+
+MAX_BYTES = 64_000_000
+"""Of a file of heights; a million cells of doubles have 8 MB."""
+
+PICTURES = ('.png', '.tif', '.tiff')
+
+UNSCALED = (1.0, 1.0, 1.0)
+
+
+def surface_kind(entry: dict) -> str | None:
+    """The kind of surface that is the shape of an entry of `bodies:`, if it is one."""
+    shape = entry.get('shape')
+    return next((kind for kind in SURFACES if isinstance(shape, dict) and kind in shape), None)
+
+
+def build_surface(entry: dict, folder: Path) -> Surface:
+    """The surface of an entry; paths are relative to ``folder``. Raises ModelError."""
+    kind = surface_kind(entry)
+    assert kind
+    data = entry['shape'][kind]
+    try:
+        return _mesh(data, folder) if kind == 'mesh' else _height_field(data, folder)
+    except errors.ModelError as error:
+        raise error.at('shape' if error.path.startswith(kind) else f'shape.{kind}') from None
+
+
+def surface_data(surface: Surface) -> dict:
+    """A surface in the form of scene.schema.json: its file, or its numbers where it has none."""
+    if isinstance(surface, HeightField):
+        data: dict[str, Any] = {'size': list(surface.size)}
+        if surface.source:
+            data |= {'heights': surface.source[0], 'scale': surface.source[1]}
+        else:
+            data['heights'] = surface.heights.tolist()
+    elif isinstance(surface, Mesh) and surface.source:
+        data = {'file': surface.source[0], 'scale': list(surface.source[1])}
+    else:
+        vertices, faces = surface.mesh()
+        data = {'vertices': vertices.tolist(), 'faces': faces.tolist()}
+    return {'shape': {surface.kind: data}}
+
+
+def _height_field(data: dict, folder: Path) -> HeightField:
+    heights, size = data['heights'], floats(data['size'])
+    if not isinstance(heights, str):
+        if 'scale' in data:
+            raise errors.WrongForm('scale', data['scale'], 'heights from a file: numbers are in m')
+        return HeightField(heights, size)
+    path, scale = _found('heights', heights, folder), data.get('scale', 1.0)
+    return HeightField(scale * _read_heights(path), size, source=(str(path), float(scale)))
+
+
+def _mesh(data: dict, folder: Path) -> Mesh:
+    if 'file' not in data:
+        if 'scale' in data:
+            raise errors.WrongForm('scale', data['scale'], 'a file: vertices are in m')
+        return Mesh(data['vertices'], data['faces'])
+    path, scale = _found('file', data['file'], folder), floats(data.get('scale', UNSCALED))
+    try:
+        corners = read_mesh(path, scale)
+    except errors.ModelError as error:
+        raise type(error)(f'file.({path.name})', error.value, error.expected) from None
+    vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    if np.prod(scale) < 0:
+        faces = faces[:, ::-1]  # a mirrored mesh is inside out
+    return Mesh(vertices, faces, source=(str(path), _three(scale)))
+
+
+def _three(values: tuple[float, ...]) -> Vector:
+    x, y, z = values
+    return x, y, z
+
+
+def _found(key: str, name: str, folder: Path) -> Path:
+    path = find_file(name, folder) or find_file(name, config_folder())
+    if path is None:
+        raise errors.Unreadable(key, name, 'a file: a path from the scene, or package://PACKAGE/PATH')
+    return path.resolve()
+
+
+def _read_heights(path: Path) -> np.ndarray:
+    """Heights (rows, columns) of a file, rows along y: of a .npy as they are, of a picture 0 to 1
+    from black to white, its lowest row first.
+    """
+    kind, where = path.suffix.lower(), f'heights.({path.name})'
+    if kind != '.npy' and kind not in PICTURES:
+        raise errors.Unreadable(where, path.name, 'one of ' + ', '.join(('.npy', *PICTURES)))
+    if path.stat().st_size > MAX_BYTES:
+        raise errors.Unreadable(where, f'{path.stat().st_size} bytes', f'at most {MAX_BYTES}')
+    try:
+        if kind == '.npy':
+            return np.asarray(np.load(path, allow_pickle=False), float)
+        picture = _read_picture(path, where)
+    except errors.ModelError:
+        raise
+    # Readers do not validate their input: a broken file may raise anything.
+    except Exception as error:
+        said = ' '.join(f'{type(error).__name__}: {error}'.split())
+        raise errors.Unreadable(where, said[:100], 'an array of heights') from None
+    most = np.iinfo(picture.dtype).max if picture.dtype.kind in 'ui' else 1.0
+    return picture[::-1].astype(float) / most
+
+
+def _read_picture(path: Path, where: str) -> np.ndarray:
+    """Grey values (rows, columns) of a picture."""
+    try:
+        import imageio.v3
+    except ImportError:
+        raise errors.Unreadable(where, path.name,
+                                "imageio to read it: pip install '.[viewer]'") from None
+    picture = np.asarray(imageio.v3.imread(path))
+    if picture.ndim != 2:
+        raise errors.WrongForm(where, f'{picture.ndim} dimensions', 'a greyscale picture')
+    return picture

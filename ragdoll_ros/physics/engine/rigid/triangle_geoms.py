@@ -1,0 +1,30 @@
+"""Geoms of the triangles of a static surface."""
+import numpy as np
+
+from ....model import rotation
+from ....model.mesh import Triangles
+from ....model.pose import Pose
+from ...kernels.collision.shapes import TRIANGLE
+from ...kernels.dynamics.body import WORLD
+from ...kernels.system import GEOM
+
+
+def triangle_geoms(triangles: Triangles, pose: Pose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """GEOM (t,) of triangles at a pose in the world, see kernels/collision/triangles/triangle.py,
+    and the lower and the upper corners (t, 3) m of their bounding boxes.
+    """
+    corners = pose.apply(triangles.corners)
+    normal = rotation.rotate(pose.orientation, triangles.normals)
+    center = corners.mean(axis=1)
+    along = corners[:, 1] - corners[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    along /= length[:, None]
+    axes = np.stack([along, np.cross(normal, along), normal], axis=2)
+    arms = np.einsum('tji,tkj->tki', axes, corners - center[:, None])
+    geoms = np.zeros(len(corners), GEOM)
+    geoms['body'], geoms['kind'] = WORLD, TRIANGLE
+    geoms['size'] = np.stack([arms[:, 0, 0], length, arms[:, 2, 1]], axis=1)
+    geoms['position'], geoms['edges'] = center, triangles.edges
+    geoms['orientation'] = rotation.from_matrix(axes)
+    geoms['bounding_radius'] = np.linalg.norm(arms, axis=2).max(axis=1)
+    return geoms, corners.min(axis=1), corners.max(axis=1)

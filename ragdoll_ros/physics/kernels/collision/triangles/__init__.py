@@ -1,0 +1,1 @@
+"""Narrow phase of a shape and a triangle of a surface: axis, gap and manifold."""

@@ -1,0 +1,156 @@
+"""The axis of contact of a shape and a triangle, among the normals that its edges allow.
+
+Along any unit vector d a shape a and a triangle are separated by s(d), the least of d x over a less
+the largest of d x over the triangle. The largest s over all d is their distance. Candidates are, as
+in SAT, the normals of faces and the cross products of edges; of a segment, the core of a sphere or
+capsule, the directions between corners, edges and ends as well, so that the largest is among them.
+The rim of a cylinder against an edge is taken for less apart than it is.
+"""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ...compiling.decorators import compiled
+from ...maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, sub)
+from ..shapes import BOX, CAPSULE, CYLINDER, SPHERE, Shape, core_extent
+from .triangle import (Corners, allowed_at_edge, corners_of, edge_vectors, is_allowed_at_corner,
+                       outward_vectors, seen_from_below, supporting_corner)
+
+FACE, FIRST_CORNER = -1, 3
+"""Features of a triangle: its face; its edges 0 to 2; its corners from FIRST_CORNER on."""
+
+PARALLEL_SINE = 1e-8
+"""Sine between two edges below which their cross product says nothing."""
+
+SHORTEST = 1e-12
+"""m: a vector that is shorter has no direction."""
+
+REACH, BARELY = 0.2, 1e-6
+"""m: what is on a triangle's plane and beside the triangle, but not farther than REACH, touches it:
+it may come onto it within a step, and has contact points from when it does. BARELY is the gap
+there, and the largest depth."""
+
+SHALLOW = 1e-3
+"""m: what is deeper below a triangle's plane, and half as deep in it from beside, is beside it."""
+
+
+class LimitedAxis(NamedTuple):
+    """``distance``, m: the largest separation of all. ``allowed``: of those that the edges allow,
+    along ``axis`` and between a and the ``feature`` of the triangle; ``face``: along the
+    ``normal``, which points to the side of a's center; ``edges``: of that side. All are of a's
+    core, without the radius of a sphere or capsule.
+    """
+
+    distance: float
+    allowed: float
+    axis: Vec3
+    feature: int
+    face: float
+    normal: Vec3
+    edges: Vec3
+
+
+@compiled
+def core_separation(a: Shape, corners: Corners, c: Vec3, d: Vec3) -> float:
+    """Separation s(d), m, of a's core at ``c``, m, from the triangle's centroid."""
+    half = 0.0 if a.kind == SPHERE else core_extent(a, d)
+    return dot(c, d) - half - max(dot(corners[0], d), dot(corners[1], d), dot(corners[2], d))
+
+
+@compiled
+def core_radius(a: Shape) -> float:
+    """Radius, m, around the core of a sphere or capsule; 0 of other shapes."""
+    return a.size[0] if a.kind <= CAPSULE else 0.0
+
+
+@compiled
+def edge_direction(a: Shape, c: Vec3, corner: Vec3, along: Vec3, turn: int) -> Vec3:
+    """Candidate number ``turn`` between an edge of the triangle and a's core, perpendicular to the
+    edge, of any length: across it and an edge or the axis of a, and of all but boxes towards the
+    ends of the axis.
+    """
+    if a.kind == BOX:
+        return cross(along, column(a.rotation, turn))
+    u = column(a.rotation, 2)
+    if turn == 0:
+        return cross(along, u)
+    half = 0.0 if a.kind == SPHERE else a.size[1]
+    arm = sub(add_scaled(c, half if turn == 1 else -half, u), corner)
+    return add_scaled(arm, -dot(arm, along), along)
+
+
+@compiled
+def corner_direction(a: Shape, c: Vec3, corner: Vec3) -> Vec3:
+    """From a corner to the nearest point of the axis of a sphere, capsule or cylinder."""
+    u, half = column(a.rotation, 2), 0.0 if a.kind == SPHERE else a.size[1]
+    arm = sub(c, corner)
+    t = min(max(-dot(arm, u), -half), half)
+    return add_scaled(arm, t, u)
+
+
+@compiled
+def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
+    """Separations of a shape from a triangle."""
+    corners, c = corners_of(t), sub(a.position, t.position)
+    along, normal, edges = edge_vectors(corners), column(t.rotation, 2), t.edges
+    outward = outward_vectors(along, normal)
+    if dot(normal, c) < 0:
+        normal, edges = neg(normal), seen_from_below(edges)
+    face = core_separation(a, corners, c, normal)
+    distance = allowed = face
+    axis, feature = normal, FACE
+    for k in range(3):
+        distance = max(distance, core_separation(a, corners, c, outward[k]))
+        for turn in range(3):
+            if a.kind == SPHERE and turn != 1:
+                continue
+            d = edge_direction(a, c, corners[k], along[k], turn)
+            length = norm(d)
+            if length < PARALLEL_SINE:
+                continue
+            d = divide(d, length)
+            d = neg(d) if dot(d, c) < 0 else d
+            found = core_separation(a, corners, c, d)
+            distance = max(distance, found)
+            limited = allowed_at_edge(d, normal, outward[k], edges[k])
+            found = core_separation(a, corners, c, limited)
+            if found > allowed:
+                allowed, axis, feature = found, limited, k
+    for k in range(3):
+        if a.kind <= CAPSULE or (a.kind == CYLINDER and k < 2):
+            d = corner_direction(a, c, corners[k])
+        else:
+            d = column(a.rotation, k)
+        length = norm(d)
+        if length < SHORTEST:
+            continue
+        d = divide(d, length)
+        d = neg(d) if dot(d, c) < 0 else d
+        found, corner = core_separation(a, corners, c, d), supporting_corner(corners, d)
+        distance = max(distance, found)
+        if found > allowed and is_allowed_at_corner(d, normal, outward, edges, corner):
+            allowed, axis, feature = found, d, FIRST_CORNER + corner
+    return LimitedAxis(distance, allowed, axis, feature, face, normal, edges)
+
+
+@compiled
+def is_beside(found: LimitedAxis, radius: float) -> bool:
+    """Whether a shape is beside a triangle, not on it, though it is below its plane: another face
+    explains that it is there.
+    """
+    depth = found.allowed - radius
+    return depth < -SHALLOW and found.distance - radius > depth / 2
+
+
+@compiled
+def triangle_separation(a: Shape, t: Shape) -> float:
+    """Gap, m, of a shape and a triangle by the normals that its edges allow. Of what is beside it
+    this says how far it is from the triangle's plane, or from that of the next one.
+    """
+    found, radius = limited_axis(a, t), core_radius(a)
+    distance, gap = found.distance - radius, found.allowed - radius
+    if is_beside(found, radius):
+        return max(distance, -BARELY)
+    if distance > gap:
+        gap = max(gap, BARELY * (distance / REACH) ** 2 if distance > 0 else max(distance, -BARELY))
+    return gap

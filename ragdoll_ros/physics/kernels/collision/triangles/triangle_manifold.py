@@ -1,0 +1,175 @@
+"""Contact manifold of a shape and a triangle of a surface.
+
+On the triangle's face a's own face, edge or vertex is clipped by the triangle's sides. Points that
+an edge cuts off are left out where the surface goes on, flat or bent up: the next triangle has
+them. At an edge or corner of the triangle, a's face clips it, or two edges touch.
+"""
+from __future__ import annotations
+
+
+import numpy as np
+
+from ...compiling.decorators import compiled
+from ...maths.vectors import (Vec3, add, add_scaled, column, dot, neg, put, scale, sub, vec)
+from ..clipping import MAX_CLIPPED, clip_polygon
+from ..convex_manifold import FACE_COSINE, MERGE_RATIO, clip_edges, closest_on_edges
+from ..features import FEATURE_SINE, MAX_CORNERS, face_cosine, supporting_edge, supporting_face
+from ..manifold import CLIP_VERTEX, merge_points, reduce_points
+from ..separating_axis import FACE_BIAS, FACE_BIAS_RATIO
+from ..shapes import BOX, CAPSULE, SPHERE, Shape, bounding_radius
+from .limited_axis import FACE, FIRST_CORNER, LimitedAxis, core_radius, is_beside, limited_axis
+from .triangle import FLAT, Corners, corners_of, supporting_corner
+
+WIDER = 1 + 1e-9
+"""Scale of the triangle that clips, so that a point on the edge between two is on both."""
+
+IS_DISTANCE = 1e-7
+"""m: an allowed separation that differs by less from the distance is between the nearest points."""
+
+ON_FACE = 8
+"""Feature ids of points on the triangle's face that are vertices of a: below this."""
+
+FACE_IDS, REFERENCE_IDS, CLOSEST_ID = 1024, 2048, 3072
+"""First feature ids of others on the triangle's face, and on a's face; the id of the closest."""
+
+
+@compiled
+def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -> int:
+    """Write the manifold of a shape and a triangle; arguments and return value as collide()."""
+    found, radius = limited_axis(a, t), core_radius(a)
+    if found.allowed - radius > margin or is_beside(found, radius):
+        return 0
+    scratch = np.empty(2 * MAX_CLIPPED + MAX_CORNERS, CLIP_VERTEX)
+    points = scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
+    corners, arm = corners_of(t), sub(a.position, t.position)
+    s, n, feature = found.allowed, found.axis, found.feature
+    if a.kind >= BOX and s < found.face + FACE_BIAS + FACE_BIAS_RATIO * abs(s):
+        s, n, feature = found.face, found.normal, FACE
+    if feature == FACE:
+        count, clipped = clip_by_triangle(a, arm, corners, found, scratch)
+    elif a.kind >= BOX and face_cosine(a, n) >= FACE_COSINE:
+        count = clipped = clip_triangle(a, arm, corners, n, scratch)
+    else:
+        middle, u = a_edge(a, arm, n)
+        other, v = triangle_edge(corners, feature)
+        count = clipped = clip_edges(middle, u, other, v, n, points)
+    if clipped == 0 and s > found.distance - IS_DISTANCE:
+        middle, u = a_edge(a, arm, n)
+        if feature == FACE:
+            middle = add_scaled(middle, -s / 2, n)
+        else:
+            other, v = triangle_edge(corners, feature)
+            middle = closest_on_edges(middle, u, other, v, n, s)
+        put(points[0].point, middle)
+        points[0].gap, points[0].feature_id = s, CLOSEST_ID
+        count = 1
+    distance = MERGE_RATIO * min(bounding_radius(a), bounding_radius(t))
+    count = reduce_points(points, merge_points(points, count, margin + radius, distance))
+    for i in range(count):
+        contact, point = manifold[i], points[i]
+        put(contact.point, add(t.position, add_scaled(vec(point.point), -radius / 2, n)))
+        put(contact.normal, n)
+        contact.gap, contact.feature_id = point.gap - radius, point.feature_id
+    return count
+
+
+@compiled
+def a_edge(a: Shape, arm: Vec3, n: Vec3) -> tuple[Vec3, Vec3]:
+    """Middle, m, from the triangle's centroid, and half vector of the edge or line of a's core that
+    supports against n; the half of a point is 0. ``arm``: a's center.
+    """
+    if a.kind == SPHERE:
+        return arm, (0.0, 0.0, 0.0)
+    if a.kind == CAPSULE:
+        half = scale(a.size[1], column(a.rotation, 2))
+        rise = dot(column(a.rotation, 2), n)
+        if abs(rise) < FEATURE_SINE:
+            return arm, half
+        return add_scaled(arm, -1.0 if rise > 0 else 1.0, half), (0.0, 0.0, 0.0)
+    middle, half = supporting_edge(a, neg(n))
+    return add(arm, middle), half
+
+
+@compiled
+def triangle_edge(corners: Corners, feature: int) -> tuple[Vec3, Vec3]:
+    """Middle, m, and half vector of an edge of a triangle; the half of a corner is 0."""
+    if feature >= FIRST_CORNER:
+        return corners[feature - FIRST_CORNER], (0.0, 0.0, 0.0)
+    begin, end = corners[feature], corners[(feature + 1) % 3]
+    return scale(0.5, add(begin, end)), scale(0.5, sub(end, begin))
+
+
+@compiled
+def put_corners(corners: Corners, factor: float, out: np.ndarray) -> None:
+    """Write a triangle to ``out``, its last corner twice: polygons that clip have even numbers."""
+    for k in range(4):
+        put(out[k].point, scale(factor, corners[min(k, 2)]))
+        out[k].feature_id = k
+
+
+@compiled
+def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
+                     scratch: np.ndarray) -> tuple[int, int]:
+    """Clip what of a's core supports against the triangle's normal by the triangle. Writes the
+    points to ``scratch`` from MAX_CLIPPED on. Returns their number, and how many there were before
+    those were left out that the next triangle has.
+    """
+    polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
+    sides, n, number = scratch[2 * MAX_CLIPPED:], found.normal, 0
+    if a.kind <= CAPSULE:
+        number, half = (1, 0.0) if a.kind == SPHERE else (2, a.size[1])
+        for i in range(number):
+            put(polygon[i].point, scale(half if i else -half, column(a.rotation, 2)))
+    else:
+        number, _ = supporting_face(a, neg(n), (0.0, 0.0, 0.0), polygon)
+    for i in range(number):
+        put(polygon[i].point, add(vec(polygon[i].point), arm))
+        polygon[i].feature_id = i
+    put_corners(corners, WIDER, sides)
+    number = clip_polygon(sides, 4, n, polygon, number, points)
+    count = 0
+    for i in range(number):
+        vertex, before = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
+        if goes_on(found.edges, before) or goes_on(found.edges, vertex.feature_id):
+            continue
+        height = dot(n, vec(vertex.point))
+        put(points[count].point, add_scaled(vec(vertex.point), -(height / 2), n))
+        points[count].gap = height
+        points[count].feature_id = FACE_IDS + before * 2 * MAX_CORNERS + vertex.feature_id
+        if before < MAX_CORNERS and vertex.feature_id < MAX_CORNERS:
+            points[count].feature_id = vertex.feature_id
+        count += 1
+    return count, number
+
+
+@compiled
+def goes_on(edges: Vec3, side: int) -> bool:
+    """Whether ``side``, an id of clip_polygon(), is an edge beyond which the surface goes on, flat
+    or bent up.
+    """
+    return side >= MAX_CORNERS and not edges[min(side - MAX_CORNERS, 2)] > FLAT
+
+
+@compiled
+def clip_triangle(a: Shape, arm: Vec3, corners: Corners, n: Vec3, scratch: np.ndarray) -> int:
+    """Clip the triangle by the face of a, a box or cylinder, that supports against n. Writes the
+    points to ``scratch`` from MAX_CLIPPED on. Returns their number.
+    """
+    polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
+    sides = scratch[2 * MAX_CLIPPED:]
+    put_corners(corners, 1.0, polygon)
+    nearest = sub(corners[supporting_corner(corners, n)], arm)
+    number, face = supporting_face(a, neg(n), nearest, sides)
+    for i in range(number):
+        put(sides[i].point, add(vec(sides[i].point), arm))
+    origin = vec(sides[0].point)
+    number = clip_polygon(sides, number, n, polygon, 3, points)
+    normal = column(a.rotation, face // 2 if a.kind == BOX else 2)
+    cosine = dot(normal, n)
+    for i in range(number):
+        vertex, before = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
+        height = dot(normal, sub(origin, vec(vertex.point))) / cosine
+        put(points[i].point, add_scaled(vec(vertex.point), height / 2, n))
+        points[i].gap = height
+        points[i].feature_id = REFERENCE_IDS + before * 2 * MAX_CORNERS + vertex.feature_id
+    return number

@@ -1,0 +1,133 @@
+"""Narrow phase of triangles: distances and normals against minimization of the distance."""
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.mesh import Mesh
+from ragdoll_ros.model.pose import Pose
+from ragdoll_ros.physics.engine.rigid.triangle_geoms import triangle_geoms
+from ragdoll_ros.physics.kernels.collision.narrow_phase import collide, separation
+from ragdoll_ros.physics.kernels.collision.shapes import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    SPHERE,
+    TRIANGLE,
+    Shape,
+)
+from ragdoll_ros.physics.kernels.system import CONTACT_POINT, MAX_MANIFOLD_POINTS
+
+SIZES = {SPHERE: (0.2, 0.0, 0.0), CAPSULE: (0.1, 0.3, 0.0), BOX: (0.2, 0.3, 0.1),
+         CYLINDER: (0.2, 0.3, 0.0)}
+
+
+@numba.njit(error_model='numpy')
+def measure(a, b, margin, out):
+    return separation(a, b, 3.0), collide(a, b, margin, out)
+
+
+def placed(kind, position, turn):
+    return Shape(kind, SIZES[kind], tuple(map(float, position)), rotation.matrix(turn))
+
+
+def geoms(vertices, faces, pose=None):
+    """The triangles of a mesh as shapes."""
+    found, _, _ = triangle_geoms(Mesh(vertices, faces).triangles, pose or Pose())
+    return [Shape(TRIANGLE, tuple(each['size'].tolist()), tuple(each['position'].tolist()),
+                  rotation.matrix(each['orientation']), tuple(each['edges'].tolist()))
+            for each in found]
+
+
+def least_distance(shape, corners):
+    """Distance, m, of a shape from a triangle, by sequential quadratic programming."""
+    size, best = shape.size, np.inf
+    count = {SPHERE: 0, CAPSULE: 1, BOX: 3, CYLINDER: 3}[shape.kind]
+    box = {SPHERE: [], CAPSULE: [size[1]], BOX: list(size), CYLINDER: [size[0], size[0], size[1]]}
+
+    def point(x):
+        local = np.zeros(3)
+        local[3 - count:] = x[2:]
+        return np.array(shape.position) + shape.rotation @ local
+
+    def square(x):
+        on = corners[0] + x[0] * (corners[1] - corners[0]) + x[1] * (corners[2] - corners[0])
+        return float(((point(x) - on) ** 2).sum())
+    limits = [{'type': 'ineq', 'fun': lambda x: 1 - x[0] - x[1]}]
+    if shape.kind == CYLINDER:
+        limits.append({'type': 'ineq', 'fun': lambda x: size[0] ** 2 - x[2] ** 2 - x[3] ** 2})
+    bounds = [(0, 1)] * 2 + [(-half, half) for half in box[shape.kind]]
+    for start in np.random.default_rng(3).uniform(0, 0.3, (3, 2 + count)):
+        found = minimize(square, start, method='SLSQP', bounds=bounds, constraints=limits,
+                         options={'ftol': 1e-15, 'maxiter': 300})
+        best = min(best, found.fun)
+    return np.sqrt(max(best, 0.0)) - (size[0] if shape.kind <= CAPSULE else 0.0)
+
+
+@pytest.mark.parametrize('kind', SIZES)
+def test_the_gap_of_an_open_triangle_is_the_distance(kind):
+    """In random poses, apart. That of a box is its largest separation along an axis: above zero
+    where it is apart, and no more than the distance. The rim of a cylinder may be taken for 1 cm
+    nearer.
+    """
+    early = 0.01 if kind == CYLINDER else 0.0
+    random = np.random.default_rng(kind)
+    out, checked = np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT), 0
+    while checked < 60:
+        corners = random.uniform(-0.6, 0.6, (3, 3))
+        turn = rotation.normalized(random.normal(size=4))
+        shape = placed(kind, random.uniform(-0.8, 0.8, 3), turn)
+        triangle, = geoms(corners, [[0, 1, 2]])
+        gap, count = measure(shape, triangle, 3.0, out)
+        true = least_distance(shape, corners)
+        if true < 1e-3:
+            continue
+        checked += 1
+        assert gap < true + 1e-6
+        assert gap > 0 or true < early
+        if kind <= CAPSULE:
+            assert gap == pytest.approx(true, abs=1e-6)
+            assert count and out[:count]['gap'].min() == pytest.approx(true, abs=1e-6)
+            np.testing.assert_allclose(np.linalg.norm(out[:count]['normal'], axis=1), 1)
+
+
+@pytest.mark.parametrize('kind', SIZES)
+@pytest.mark.parametrize('bend', [-0.3, 0.0, 0.3])
+def test_normals_at_an_edge_lie_between_those_of_the_faces(kind, bend):
+    """Over two triangles with a common edge along y, whatever is near it and above both."""
+    vertices = [[0, -2, 0], [0, 2, 0], [2, 0, -2 * np.tan(bend / 2)],
+                [-2, 0, -2 * np.tan(bend / 2)]]
+    pair = geoms(vertices, [[0, 2, 1], [0, 1, 3]])
+    random, found = np.random.default_rng(5), 0
+    out = np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT)
+    for _ in range(200):
+        turn = rotation.normalized(random.normal(size=4))
+        x, y = random.uniform(-0.2, 0.2), random.uniform(-1, 1)
+        low = max(_support(kind, turn, pair_normal(t)) - np.dot(pair_normal(t), (x, y, 0))
+                  for t in pair)
+        shape = placed(kind, (x, y, low / np.cos(bend / 2) + 1e-3), turn)
+        for triangle in pair:
+            _, count = measure(shape, triangle, 0.05, out)
+            for normal in out[:count]['normal']:
+                found += 1
+                assert abs(normal[1]) < 1e-9
+                assert abs(np.arctan2(normal[0], normal[2])) < abs(bend) / 2 + 1e-9
+                if bend <= 0:
+                    np.testing.assert_allclose(normal, pair_normal(triangle), atol=1e-12)
+    assert found > 100
+
+
+def pair_normal(triangle):
+    return triangle.rotation[:, 2]
+
+
+def _support(kind, turn, normal):
+    """Extent, m, of a shape along a normal."""
+    x, y, z = rotation.rotate(rotation.inverse(turn), normal)
+    size = SIZES[kind]
+    return {SPHERE: size[0], CAPSULE: size[0] + size[1] * abs(z),
+            BOX: size[0] * abs(x) + size[1] * abs(y) + size[2] * abs(z),
+            CYLINDER: size[0] * np.hypot(x, y) + size[1] * abs(z)}[kind]
