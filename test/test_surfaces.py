@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 
 import numpy as np
 import pytest
@@ -134,7 +135,8 @@ def test_a_cube_of_triangles_is_a_box(accuracy):
         law = {'restitution': 0.3, 'friction': 0.3}
         on_mesh, _ = states(scene(ball, [cube], **law), 0.8, accuracy)
         on_box, _ = states(scene(ball, [box], **law), 0.8, accuracy)
-        np.testing.assert_allclose(on_mesh[:, 0, :3], on_box[:, 0, :3], atol=1e-6)
+        np.testing.assert_allclose(on_mesh[:, 0, :3], on_box[:, 0, :3],
+                                   atol=1e-6 if accuracy == 'exact' else 1e-5)
 
 
 @pytest.mark.parametrize('accuracy', ACCURACIES)
@@ -159,13 +161,13 @@ def test_a_doll_falls_on_terrain(accuracy):
         for _ in range(1500):
             state = simulation.advance()
             deepest = max(deepest, depth(placed, state))
-            if simulation.sleeping.all():
+            if simulation.asleep:
                 break
         measures = simulation.measures()
         assert np.isfinite(state.rows).all()
         assert measures['energy_excess_J'] < 1e-3 * abs(started)
         assert deepest < 1e-3
-        assert simulation.sleeping.all() or np.abs(state.rows[:, 7:]).max() < 0.05
+        assert simulation.asleep
 
 
 def depth(placed, state):
@@ -208,19 +210,23 @@ def test_edges_know_by_how_much_the_surface_bends():
 
 
 def test_triangles_far_away_cost_nothing():
-    """A tick over a quarter of a million triangles, at most 1.2 of one over two hundred."""
-    def cost(cells):
-        start = loose(BOX, position=(0.1, 0.2, 0.1), velocity=(3, 0, 0))
+    """A tick over a quarter of a million triangles costs at most 1.2 of one over eighteen."""
+    def make(cells):
+        start = loose(BOX, position=(0.1, 0.2, 0.1), spin=(0, 0, 0.5))
         placed = scene(start, [flat(cells, 1.0 * cells)], friction=0.0, restitution=0.0)
-        with Simulation(placed) as simulation:
-            simulation.run(20)
-            return simulation.advance().rows, simulation
+        return Simulation(placed)
 
-    few, one = cost(10)
-    many, other = cost(354)
-    assert len(other.scene.bodies[0].shape.triangles.corners) > 250_000
-    np.testing.assert_allclose(few, many, atol=1e-9)
-    del one, other
+    with make(3) as few, make(355) as many:
+        assert len(many.scene.bodies[0].shape.triangles.corners) > 250_000
+        costs = np.zeros((2, 400))
+        for tick in range(400):  # in turn, so that both meet the same load
+            for number, simulation in enumerate((few, many)):
+                began = time.perf_counter()
+                simulation.advance()
+                costs[number, tick] = time.perf_counter() - began
+        np.testing.assert_allclose(few.state.rows, many.state.rows, atol=1e-9)
+    one, other = np.median(costs, axis=1)
+    assert other < 1.2 * one
 
 
 @pytest.mark.parametrize('text, path, told', [
@@ -279,7 +285,7 @@ bodies:
 def test_other_engines_refuse_surfaces():
     pytest.importorskip('mujoco')
     placed = Scene('s', (Placement(load_scene('drop').dolls[0].doll),), bodies=(flat(2, 2.0),))
-    with pytest.raises(RagdollError, match=r'flat is a height_field'):
+    with pytest.raises(RagdollError, match='which has meshes and height fields'):
         Simulation(placed, engine='mujoco')
 
 

@@ -196,7 +196,8 @@ def _array(path: str, value: object, dimensions: int, form: str) -> np.ndarray:
     broken = ~np.isfinite(array)
     if broken.any():
         row, column = np.argwhere(broken)[0].tolist()
-        raise errors.NotFinite(f'{path}[{row}][{column}]', float(array[row, column]))
+        raise errors.NotFinite(f'{path}[{row}][{column}]', float(array[row, column]),
+                               'a finite number')
     return array
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...kernels.collision.shapes import TRIANGLE
 from ...kernels.cluster_state import ClusterState, make_cluster_state
 from ...kernels.system import System
 
@@ -14,6 +15,10 @@ SNAPSHOT = ('dense_output', 'end_rates', 'dense_step', 'excluded', 'gaps', 'cont
 
 CONTACTS_PER_GEOM = 12
 """Capacity for contacts, for each geom; limits have their own."""
+
+TRIANGLES_TOUCHED = 8
+"""Triangles of a surface for each other geom, beyond which they add no capacity: many are near, and
+few are touched."""
 
 
 class DollStates(Sequence):
@@ -72,4 +77,7 @@ class DollStates(Sequence):
 
 def contact_capacity(system: System) -> int:
     """Number of contacts that a state of this system can store."""
-    return CONTACTS_PER_GEOM * len(system.geoms) + len(system.joint_limits)
+    triangles = int(np.count_nonzero(system.geoms['kind'] == TRIANGLE))
+    others = len(system.geoms) - triangles
+    return (CONTACTS_PER_GEOM * (others + min(triangles, TRIANGLES_TOUCHED * others))
+            + len(system.joint_limits))

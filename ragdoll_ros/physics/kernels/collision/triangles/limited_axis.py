@@ -25,10 +25,10 @@ PARALLEL_SINE = 1e-8
 SHORTEST = 1e-12
 """m: a vector that is shorter has no direction."""
 
-REACH, BARELY = 0.2, 1e-6
+REACH, BARELY = 0.05, 1e-6
 """m: what is on a triangle's plane and beside the triangle, but not farther than REACH, touches it:
-it may come onto it within a step, and has contact points from when it does. BARELY is the gap
-there, and the largest depth."""
+it may come onto it within a step, and has contact points from when it does. BARELY is the largest
+gap there, and the largest depth."""
 
 SHALLOW = 1e-3
 """m: what is deeper below a triangle's plane, and half as deep in it from beside, is beside it."""
@@ -144,13 +144,14 @@ def is_beside(found: LimitedAxis, radius: float) -> bool:
 
 @compiled
 def triangle_separation(a: Shape, t: Shape) -> float:
-    """Gap, m, of a shape and a triangle by the normals that its edges allow. Of what is beside it
-    this says how far it is from the triangle's plane, or from that of the next one.
+    """Gap, m, of a shape and a triangle by the normals that its edges allow. Of what is beside it,
+    but near, this says how far it is from the triangle's plane, or from that of the next one.
     """
     found, radius = limited_axis(a, t), core_radius(a)
     distance, gap = found.distance - radius, found.allowed - radius
     if is_beside(found, radius):
         return max(distance, -BARELY)
     if distance > gap:
-        gap = max(gap, BARELY * (distance / REACH) ** 2 if distance > 0 else max(distance, -BARELY))
+        share = min(max(distance / REACH, 0.0), 1.0)
+        return max(gap, distance - REACH, BARELY * share * share + min(max(distance, -BARELY), 0.0))
     return gap
