@@ -65,8 +65,8 @@ class Mesh(Surface):
         source: the file that it is from and the scale along its axes, if any.
 
     Example:
-        >>> Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).triangles.normals.tolist()
-        [[0.0, 0.0, 1.0]]
+        >>> Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).triangles.corners.shape
+        (1, 3, 3)
     """
 
     vertices: np.ndarray
