@@ -18,7 +18,9 @@ from ragdoll_ros import (
     Drive,
     Follow,
     Ground,
+    HeightField,
     Joint,
+    Mesh,
     Part,
     Placement,
     Push,
@@ -90,9 +92,13 @@ def main(folder: Path) -> None:
     doll: Ragdoll = load_doll(str(folder / 'pendulum.yaml'))
     assert doll == pendulum()
     stand = Ragdoll('stand', (Bone('stand', Cylinder(0.2, 0.1), 5.0, (0.0, 0.0, 0.05)),))
+    hill = StaticBody('hill', HeightField(np.array([[0.0, 0.1], [0.0, 0.2]]), (4.0, 4.0)),
+                      (0.0, 9.0, 0.0))
+    ramp = StaticBody('ramp', Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 1]], float),
+                                   np.array([[0, 1, 2]])), (0.0, -9.0, 0.0))
     scene = Scene('pair', (Placement(doll, position=(0.0, 0.0, 2.0)), Placement(stand),
                            Placement(person(1.75, 70.0, 'female'), position=(1.0, 0.0, 0.0))),
-                  Ground(), bodies=(StaticBody('wall', Box((0.1, 2.0, 2.0)), (2.0, 0.0, 1.0)),))
+                  Ground(), bodies=(StaticBody('wall', Box((0.1, 2.0, 2.0)), (2.0, 0.0, 1.0)), hill, ramp))
     save_scene(scene, folder / 'pair.yaml')
     state = fall(load_scene(str(folder / 'pair.yaml')), folder)
     rows: tuple[int, ...] = state.positions.shape
