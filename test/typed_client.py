@@ -98,7 +98,8 @@ def main(folder: Path) -> None:
                                    np.array([[0, 1, 2]])), (0.0, -9.0, 0.0))
     scene = Scene('pair', (Placement(doll, position=(0.0, 0.0, 2.0)), Placement(stand),
                            Placement(person(1.75, 70.0, 'female'), position=(1.0, 0.0, 0.0))),
-                  Ground(), bodies=(StaticBody('wall', Box((0.1, 2.0, 2.0)), (2.0, 0.0, 1.0)), hill, ramp))
+                  Ground(), bodies=(StaticBody('wall', Box((0.1, 2.0, 2.0)), (2.0, 0.0, 1.0)),
+                                    hill, ramp))
     save_scene(scene, folder / 'pair.yaml')
     state = fall(load_scene(str(folder / 'pair.yaml')), folder)
     rows: tuple[int, ...] = state.positions.shape
