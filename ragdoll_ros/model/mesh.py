@@ -36,20 +36,29 @@ class Triangles:
 
 
 class Surface:
-    """Base of the surfaces. Each has ``mesh()``: vertices (v, 3) m and triangles (t, 3)."""
+    """Base of the surfaces."""
 
     kind: ClassVar[str]
     parts: ClassVar[tuple] = ()
     """It has no solid parts."""
     primitives: ClassVar[tuple] = ()
 
+    def mesh(self) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (v, 3) m and triangles (t, 3)."""
+        raise NotImplementedError
+
     @functools.cached_property
     def triangles(self) -> Triangles:
         """Its triangles, in its own axes; those without a normal are left out."""
         return connected(*self.mesh())
 
+    @functools.cached_property
+    def _digest(self) -> bytes:
+        raise NotImplementedError
+
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and self._digest == other._digest
+        return (isinstance(other, Surface) and type(self) is type(other)
+                and self._digest == other._digest)
 
     def __hash__(self) -> int:
         return hash(self._digest)
