@@ -19,11 +19,14 @@ class Accuracy:
     energy: bool = True
     """Correct energy, and momentum without contact, where the engine does not conserve them:
     PyBullet."""
+    solve_error: float = 1e-4
+    """Residual to which the rigid engine solves the contacts of large islands, as a share of the
+    largest velocity at them: as the step begins, or as it would end without contacts, if less."""
 
 
-DRAFT = Accuracy(step=4e-3, flight_error=1e-10, substeps=4)
-NORMAL = Accuracy(step=2.5e-3, flight_error=1e-11, substeps=10)
-EXACT = Accuracy(step=5e-4, flight_error=1e-13, substeps=40)
+DRAFT = Accuracy(step=4e-3, flight_error=1e-10, substeps=4, solve_error=1e-3)
+NORMAL = Accuracy(step=2.5e-3, flight_error=1e-11, substeps=10, solve_error=1e-4)
+EXACT = Accuracy(step=5e-4, flight_error=1e-13, substeps=40, solve_error=1e-5)
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
 

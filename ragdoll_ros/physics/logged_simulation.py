@@ -155,7 +155,8 @@ def accuracy_from(fields: dict) -> Accuracy:
     """Accuracy from its fields in an event; raises a ModelError for wrong fields."""
     try:
         accuracy = Accuracy(**fields)
-        errors.check_positive('accuracy', (accuracy.step, accuracy.flight_error, accuracy.substeps))
+        errors.check_positive('accuracy', (accuracy.step, accuracy.flight_error, accuracy.substeps,
+                                           accuracy.solve_error))
     except TypeError:
         names = [field.name for field in dataclasses.fields(Accuracy)]
         raise errors.WrongForm('accuracy', fields, 'numbers: ' + ', '.join(names)) from None

@@ -205,15 +205,19 @@ def find_islands(job: np.ndarray, windows: np.ndarray, labels: np.ndarray) -> No
         label_reachable(s, ws, ws.step.end, ws.gaps, windows[k], labels[k])
 
 
-@entry(ADDRESS[:, ::1], REAL, REAL, REAL)
-def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float) -> None:
+@entry(ADDRESS[:, ::1], REAL, REAL, REAL, REAL)
+def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float,
+            solve_error: float) -> None:
     """Advance clusters independently by ``duration`` s and write their bone states and doll sums.
     ``duration`` 0: only recompute these and the gaps.
 
     ``jobs`` (k, 3): addresses of the bundles of system, workspace and state of each. ``step``:
-    length of a contact step, s; ``tolerance``: error of a step of flight, m or rad.
+    length of a contact step, s; ``tolerance``: error of a step of flight, m or rad;
+    ``solve_error``: see physics/accuracy.py.
     """
     for k in range(len(jobs)):
         system, workspace, cluster = vec(jobs[k])
-        advance_cluster(system_at(system), workspace_at(workspace), cluster_state_at(cluster),
-                        duration, step, tolerance)
+        ws = workspace_at(workspace)
+        ws.step.scalars[0].solve_error = solve_error
+        advance_cluster(system_at(system), ws, cluster_state_at(cluster), duration, step,
+                        tolerance)

@@ -40,10 +40,10 @@ it was last halved, and the chords since."""
 
 STEP_SCALARS = np.dtype([
     ('start_contact_count', np.int64), ('seeks_impacts', np.int64), ('correction_energy', float),
-    ('start_load_potential', float), ('residual', float)], align=True)
+    ('start_load_potential', float), ('residual', float), ('solve_error', float)], align=True)
 """Of a contact step: contacts at its start; whether it ends at impacts; potential energy that
 position correction adds, J; load_potential() at its start, J; the largest residual velocity of its
-large islands, m/s."""
+large islands, m/s, and the share of the velocities that is allowed, see physics/accuracy.py."""
 
 OCCURRENCE = np.dtype([('member', np.int64), ('place', np.int64)], align=True)
 """A member of an island that a degree of freedom moves, and its place in the member's support."""
@@ -69,7 +69,7 @@ Island = collections.namedtuple(
     'start_velocity curvature correction soft velocity residual direction best step_start active '
     'places is_normal normal_rhs normal_impulses normal_row z z_direction anderson '
     'bodies body_number elimination dof_place A B BY coupled phi local lu occurrence_start '
-    'occurrences newton_steps')
+    'occurrences newton_steps newton_dofs')
 """An island of m contacts (``members``) and their rows, and scratch to solve it.
 
 ``label`` (d,): island of each doll. Rows ``Y`` = J L^-1 have entries for the degrees of freedom
@@ -81,7 +81,9 @@ start; ``curvature`` bias; ``correction`` impulses; ``soft`` impulses without re
 others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p; of sparse_newton.py:
 ``bodies`` (n,) that contacts move, ``body_number`` (n,) of each among them, their order of
 ``elimination``, the ``dof_place`` (nv,) that follows, ``lu`` and ``occurrences``; ``anderson``: of
-sweeps. ``newton_steps`` (1,): counted by both of Newton's methods."""
+sweeps. ``newton_steps`` (1,): counted by both of Newton's methods;
+``newton_dofs`` (1,): those of sparse_newton.py, 0 if sweeps cost less, -1 as long as that is not
+known."""
 
 Step = collections.namedtuple(
     'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
@@ -163,7 +165,8 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         coupled=np.zeros(max(rows, 8), np.int64),
         phi=np.zeros((contacts, 5)), local=np.zeros(5), lu=make_sparse_lu(nv, contacts, wide),
         occurrence_start=np.zeros(nv + 1, np.int64),
-        occurrences=np.zeros(contacts * wide, OCCURRENCE), newton_steps=np.zeros(1, np.int64))
+        occurrences=np.zeros(contacts * wide, OCCURRENCE), newton_steps=np.zeros(1, np.int64),
+        newton_dofs=np.zeros(1, np.int64))
 
 
 WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

@@ -183,7 +183,8 @@ class Clusters:
         if np.count_nonzero(whole) < len(whole):  # a third of what all() costs
             jobs = jobs[:, whole]
         if self.workers == 1 or jobs.shape[1] < 2:
-            kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)
+            kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error,
+                            accuracy.solve_error)
         else:
             self._advance_parallel(jobs, duration, accuracy, self._firsts[whole])
         for cluster in self._joined:
@@ -495,7 +496,7 @@ class Clusters:
         def work(worker: int) -> None:
             while (part := next(parts)) < shares:
                 kernels.advance(jobs[worker, order[part::shares]], duration, accuracy.step,
-                                accuracy.flight_error)
+                                accuracy.flight_error, accuracy.solve_error)
 
         others = [self._threads.submit(work, worker) for worker in range(1, self.workers)]
         work(0)
@@ -517,7 +518,7 @@ class Clusters:
             made = self._form_islands(cluster, label, made)
             window = window or left
             kernels.advance(np.array([island.job(0) for island in made.values()]), window,
-                            accuracy.step, accuracy.flight_error)
+                            accuracy.step, accuracy.flight_error, accuracy.solve_error)
             for island in made.values():
                 if not self._is_single(island):
                     self._scatter_state(island)

@@ -17,9 +17,8 @@ from ..system import COMPLIANCE, NO_SLIP, System
 from ..workspace import Island, Workspace
 from ..maths.anderson import accelerate
 from .one_contact import project_to_disc, solve_one_contact
-from .solver import (UNSOLVABLE, OPENING, RESTITUTION_ROUNDS, ROUNDS, UNSOLVED, energy_bound_share,
-                     scale_to_no_work)
-from .sparse_newton import find_sparsity, sparse_newton, write_velocities
+from .solver import OPENING, UNSOLVABLE, UNSOLVED, energy_bound_share, scale_to_no_work
+from .sparse_newton import find_sparsity, linearize, sparse_newton, write_velocities
 
 LARGE_ROUNDS, LARGE_SWEEPS = 2, 10
 """Rounds of sweeps and of Newton's method, and sweeps in the first; in the second eight times as
@@ -28,9 +27,17 @@ many. At rest few will do."""
 MAX_SWEEPS = 100
 """Sweeps in one solve where Newton's method would cost more."""
 
-TOLERANCE, SWEPT_TOLERANCE = 1e-6, 1e-8
-"""m/s to which a large island is solved: the residual, with which a stack of fifty does not creep,
-and the change in a sweep, which in a tall stack is far less than what is missing."""
+TOLERANCE = 1e-6
+"""m/s, or m of a correction: the least residual to which a large island is solved."""
+
+SWEPT_SHARE = 0.01
+"""Change in a sweep as a share of the tolerance: in a tall stack it is far less than what is
+missing."""
+
+CORRECTION_ERROR = 0.01
+"""Residual of position correction, as a share of the largest one: half of a penetration is left to
+the next step in any case, and at rest all of it, as no kinetic energy is there to pay for a lift.
+"""
 
 SWEEP_WORK = 200.0
 """Work of an elimination, as find_pattern() counts it, up to which Newton's method takes no longer
@@ -45,22 +52,22 @@ def solve_large(s: System, ws: Workspace, m: int, n: int, h: float, has_restitut
                 has_penetration: bool) -> None:
     """Solve an island over h s as solve_small() does, except that curvature is neglected."""
     island, b, p, u = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity)
-    dofs, work = find_sparsity(s, ws, m)
-    if not newton_is_cheaper(ws, m, work):
-        dofs = 0
+    island.newton_dofs[0] = -1
+    tolerance = max(TOLERANCE, ws.step.scalars[0].solve_error * min(
+        largest(u, n), largest(island.start_velocity, n)))
     diagonal_blocks(ws, m, COMPLIANCE)
-    rounds = RESTITUTION_ROUNDS if has_restitution and h > 0 else ROUNDS
-    left, sweeps = solve_rows(ws, m, n, b, p, dofs, rounds)
+    scale_initial_impulses(ws, m, n, b, p)
+    left, sweeps = solve_rows(s, ws, m, n, b, p, tolerance, LARGE_ROUNDS)
     if release_opening_contacts(ws, m, b, p):
-        left, more = solve_rows(ws, m, n, b, p, dofs, rounds)
+        left, more = solve_rows(s, ws, m, n, b, p, tolerance, LARGE_ROUNDS)
         sweeps += more
     work, spent = work_terms(island, n, u, p)
-    failed = rounds < ROUNDS and not left <= UNSOLVABLE
+    failed = has_restitution and h > 0 and not left <= max(UNSOLVABLE, tolerance)
     if failed or (has_restitution and work + spent / 2 > 0):
-        left = reduce_restitution(ws, m, n, dofs, failed)
+        left = reduce_restitution(s, ws, m, n, tolerance, failed)
         work, spent = work_terms(island, n, u, p)
     ws.stats[0].sweeps += sweeps
-    if not left <= UNSOLVED:
+    if not left <= max(UNSOLVED, tolerance):
         ws.stats[0].unsolved += 1
     if not work + spent / 2 <= 0:
         scale_to_no_work(p, n, work, spent)
@@ -71,44 +78,72 @@ def solve_large(s: System, ws: Workspace, m: int, n: int, h: float, has_restitut
             b[i] = island.correction[i] = 0.0
         for k in range(m):
             b[island.members[k].row] = -island.members[k].correction
-        solve_rows(ws, m, n, b, island.correction, dofs, ROUNDS)
+        tolerance = max(TOLERANCE, CORRECTION_ERROR * largest(b, n))
+        solve_rows(s, ws, m, n, b, island.correction, tolerance, 1)
 
 
 @compiled
-def newton_is_cheaper(ws: Workspace, m: int, work: int) -> bool:
-    """Whether Newton's method with this ``work`` of an elimination costs less than MAX_SWEEPS
-    sweeps; not if there is no room for it, -1.
+def largest(values: np.ndarray, n: int) -> float:
+    """The largest size of the first n of ``values``."""
+    most = 0.0
+    for i in range(n):
+        most = max(most, abs(values[i]))
+    return most
+
+
+@compiled
+def scale_initial_impulses(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray) -> None:
+    """Scale p (n,), the impulses of the step before, by the share from 0 to 1 that minimizes
+    p (b + W p / 2): after an impact all of them would be too much.
     """
-    entries = 0
-    for k in range(m):
-        member = ws.island.members[k]
-        entries += member.kind * ws.contacts.found[member.contact].dof_count
-    return 0 <= work <= SWEEP_WORK * entries
+    write_velocities(ws, m, b, p)
+    work, spent = work_terms(ws.island, n, b, p)
+    share = min(1.0, max(0.0, -work / spent)) if spent > 0 else 1.0
+    for i in range(n):
+        p[i] *= share
 
 
 @compiled
-def solve_rows(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, dofs: int,
-               rounds: int) -> tuple[float, int]:
+def prepare_newton(s: System, ws: Workspace, m: int) -> int:
+    """Degrees of freedom of Newton's method on an island, whose matrix has been ordered then; 0 if
+    it costs more than MAX_SWEEPS sweeps, or there is no room for it.
+    """
+    known = ws.island.newton_dofs
+    if known[0] < 0:
+        dofs, work = find_sparsity(s, ws, m)
+        entries = 0
+        for k in range(m):
+            member = ws.island.members[k]
+            entries += member.kind * ws.contacts.found[member.contact].dof_count
+        known[0] = dofs if 0 <= work <= SWEEP_WORK * entries else 0
+    return known[0]
+
+
+@compiled
+def solve_rows(s: System, ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
+               tolerance: float, rounds: int) -> tuple[float, int]:
     """Solve for p (n,) in place, starting from p: by sweeps, and where these stall by Newton's
-    method, in so many rounds, unless ``dofs`` is 0. Returns the residual, m/s, and the number of
-    sweeps. island.z becomes Y^T p.
+    method, in so many rounds. Returns the residual, m/s, and the number of sweeps. island.z becomes
+    Y^T p.
     """
-    if not dofs:
-        return sweep_to_tolerance(ws, m, n, b, p, MAX_SWEEPS, TOLERANCE)
-    left, done, most = math.inf, 0, LARGE_SWEEPS
-    for _ in range(min(rounds, LARGE_ROUNDS)):
-        left, sweeps = sweep_to_tolerance(ws, m, n, b, p, most, SWEPT_TOLERANCE)
+    left, done, most = linearize(ws, m, b, p)[0], 0, LARGE_SWEEPS
+    for _ in range(rounds):
+        if left <= tolerance:
+            break
+        left, sweeps = sweep_to_tolerance(ws, m, n, b, p, most, SWEPT_SHARE * tolerance)
         done, most = done + sweeps, 8 * most
-        if left <= SWEPT_TOLERANCE:
+        if left <= SWEPT_SHARE * tolerance:
             break
-        left = sparse_newton(ws, m, n, b, p, TOLERANCE, dofs)
-        if left <= UNSOLVED:
-            break
+        dofs = prepare_newton(s, ws, m)
+        if not dofs:
+            left, sweeps = sweep_to_tolerance(ws, m, n, b, p, MAX_SWEEPS, tolerance)
+            return left, done + sweeps
+        left = sparse_newton(ws, m, n, b, p, tolerance, dofs)
     return left, done
 
 
 @compiled
-def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int,
+def reduce_restitution(s: System, ws: Workspace, m: int, n: int, tolerance: float,
                        failed: bool) -> float:
     """Move island.impulses towards those without restitution until they add no energy; see
     small_island.bound_energy(); all the way if their solve has ``failed``. Returns the residual of
@@ -119,7 +154,7 @@ def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int,
                               island.z_direction)
     for i in range(n):
         soft[i] = 0.0 if failed else p[i]
-    left, _ = solve_rows(ws, m, n, u, soft, dofs, ROUNDS)
+    left, _ = solve_rows(s, ws, m, n, u, soft, tolerance, LARGE_ROUNDS)
     work, spent = work_terms(island, n, u, soft)
     if not work + spent / 2 <= 0:
         scale_to_no_work(soft, n, work, spent)

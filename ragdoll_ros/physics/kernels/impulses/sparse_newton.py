@@ -33,10 +33,11 @@ the largest of the last three (Grippo, Lampariello and Lucidi 1986), or in the f
 GROWTH times that of the start. Without, steps cycle in heaps; were each to reduce it, they would
 stall among redundant contacts."""
 
-MOST_PROXIMAL, LEAST_PROXIMAL = 1e-3, 1e-6
+MOST_PROXIMAL, LEAST_PROXIMAL = 1e-2, 1e-6
 """Share of W's diagonal that resists the steps: at first, and a tenth after each that halves the
-residual, as what is left is what the impulses of several bodies decide together. In heaps less at
-first lets the steps cycle; ten times as much takes three times as many."""
+residual, as what is left is what the impulses of several bodies decide together. Of 88 islands of
+a heap, a hundredth of the velocities is reached in 14 steps by 80 from 1e-2, 75 from 1e-1 and 62
+from 1e-3, where the first steps lead far away."""
 
 
 @compiled
