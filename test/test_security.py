@@ -80,7 +80,8 @@ def runs_what_it_is_given(called, name, call):
     """Whether a call may run what is in its arguments; a number that stands there is no input."""
     if [ast.unparse(each) for each in call.args] == ["'0'"] and not call.keywords:
         return False
-    if called in EVALUATORS or any(each.arg in ('allow_pickle', 'shell') for each in call.keywords):
+    asked = [each.arg for each in call.keywords if ast.unparse(each.value) != 'False']
+    if called in EVALUATORS or 'allow_pickle' in asked or 'shell' in asked:
         return True
     return called.startswith('yaml.') and name in UNSAFE_YAML and '_Loader' not in map(
         ast.unparse, (*call.args, *(each.value for each in call.keywords)))
@@ -89,7 +90,8 @@ def runs_what_it_is_given(called, name, call):
 @pytest.mark.parametrize('code, found', [
     ('eval(t)', True), ("eval('0')", False), ("eval('0', t)", True), ('os.system(t)', True),
     ('yaml.load(t, yaml.Loader)', True),
-    ('np.load(p, allow_pickle=True)', True), ('yaml.load(t, _Loader)', False),
+    ('np.load(p, allow_pickle=True)', True), ('np.load(p, allow_pickle=False)', False),
+    ('yaml.load(t, _Loader)', False),
     ('re.compile(t)', False), ('yaml.safe_load(t)', False)])
 def test_what_counts_as_running(tmp_path, code, found):
     (tmp_path / 'code.py').write_text(code)
