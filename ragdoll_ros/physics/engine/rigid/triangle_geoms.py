@@ -16,14 +16,16 @@ def triangle_geoms(triangles: Triangles, pose: Pose) -> tuple[np.ndarray, np.nda
     corners = pose.apply(triangles.corners)
     normal = rotation.rotate(pose.orientation, triangles.normals)
     center = corners.mean(axis=1)
-    along = corners[:, 1] - corners[:, 0]
-    length = np.linalg.norm(along, axis=1)
-    along /= length[:, None]
-    axes = np.stack([along, np.cross(normal, along), normal], axis=2)
+    first, second, _ = np.moveaxis(corners, 1, 0)
+    length = np.linalg.norm(second - first, axis=1)
+    edge = (second - first) / length[:, None]
+    axes = np.stack([edge, np.cross(normal, edge), normal], axis=2)
     arms = np.einsum('tji,tkj->tki', axes, corners - center[:, None])
     geoms = np.zeros(len(corners), GEOM)
     geoms['body'], geoms['kind'] = WORLD, TRIANGLE
-    geoms['size'] = np.stack([arms[:, 0, 0], length, arms[:, 2, 1]], axis=1)
+    first_arm, _, third_arm = np.moveaxis(arms, 1, 0)
+    (x, _, _), (_, y, _) = first_arm.T, third_arm.T
+    geoms['size'] = np.stack([x, length, y], axis=1)
     geoms['position'], geoms['edges'] = center, triangles.edges
     geoms['orientation'] = rotation.from_matrix(axes)
     geoms['bounding_radius'] = np.linalg.norm(arms, axis=2).max(axis=1)

@@ -64,19 +64,19 @@ def core_radius(a: Shape) -> float:
 
 
 @compiled
-def edge_direction(a: Shape, c: Vec3, corner: Vec3, along: Vec3, turn: int) -> Vec3:
+def edge_direction(a: Shape, c: Vec3, corner: Vec3, edge: Vec3, turn: int) -> Vec3:
     """Candidate number ``turn`` between an edge of the triangle and a's core, perpendicular to the
     edge, of any length: across it and an edge or the axis of a, and of all but boxes towards the
     ends of the axis.
     """
     if a.kind == BOX:
-        return cross(along, column(a.rotation, turn))
+        return cross(edge, column(a.rotation, turn))
     u = column(a.rotation, 2)
     if turn == 0:
-        return cross(along, u)
+        return cross(edge, u)
     half = 0.0 if a.kind == SPHERE else a.size[1]
     arm = sub(add_scaled(c, half if turn == 1 else -half, u), corner)
-    return add_scaled(arm, -dot(arm, along), along)
+    return add_scaled(arm, -dot(arm, edge), edge)
 
 
 @compiled
@@ -92,8 +92,8 @@ def corner_direction(a: Shape, c: Vec3, corner: Vec3) -> Vec3:
 def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
     """Separations of a shape from a triangle."""
     corners, c = corners_of(t), sub(a.position, t.position)
-    along, normal, edges = edge_vectors(corners), column(t.rotation, 2), t.edges
-    outward = outward_vectors(along, normal)
+    directions, normal, edges = edge_vectors(corners), column(t.rotation, 2), t.edges
+    outward = outward_vectors(directions, normal)
     if dot(normal, c) < 0:
         normal, edges = neg(normal), seen_from_below(edges)
     face = core_separation(a, corners, c, normal)
@@ -104,7 +104,7 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
         for turn in range(3):
             if a.kind == SPHERE and turn != 1:
                 continue
-            d = edge_direction(a, c, corners[k], along[k], turn)
+            d = edge_direction(a, c, corners[k], directions[k], turn)
             length = norm(d)
             if length < PARALLEL_SINE:
                 continue

@@ -47,9 +47,9 @@ def edge_vectors(corners: Corners) -> Corners:
 
 
 @compiled
-def outward_vectors(along: Corners, normal: Vec3) -> Corners:
-    """Unit vectors across the edges ``along``, in the triangle's plane, away from it."""
-    return cross(along[0], normal), cross(along[1], normal), cross(along[2], normal)
+def outward_vectors(directions: Corners, normal: Vec3) -> Corners:
+    """Unit vectors across the edges ``directions``, in the triangle's plane, away from it."""
+    return cross(directions[0], normal), cross(directions[1], normal), cross(directions[2], normal)
 
 
 @compiled
