@@ -152,7 +152,7 @@ class Seen:
         """Hold, and wait until the page shows what it should."""
         self.hold()
         try:
-            self.view.wait(self.shows_what_it_should, 40)
+            self.view.wait(self.shows_what_it_should)
         except AssertionError:
             self.shows_what_it_should(folder)
             raise AssertionError(f'{self.page.stage.scene.name}: see {folder}') from None
