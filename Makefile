@@ -3,6 +3,8 @@
 PYTHON ?= python3
 RUN_EXTRAS := viewer
 EXTRAS := test,report,fit,viewer,replay,falls
+# Processes of the tests, most of which wait: a half more than the cores of a quiet machine.
+WORKERS ?= 3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -34,7 +36,7 @@ run: $(COMPILED) ## start node and page; arrow keys push; SCENE=crowd for anothe
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
 test: $(COMPLETE) $(COMPILED) chromium ## all tests except the slow ones
-	@$(BIN)/python -m pytest -n 3 --dist loadfile
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 # For the tests of the page: of Playwright only the driver comes from PyPI. Where there is none to
 # be had, those tests are skipped and say so.
