@@ -42,19 +42,18 @@ class StateSubscription:
 
     def on_odometry(self, message: Odometry) -> None:
         """Set pose and velocities of a doll; a message that is wrong is refused and counted."""
-        try:
-            self._set(message)
-        except errors.ModelError as error:
-            self._counts.refuse(TOPIC, error)
-        else:
-            self._after()
+        self._take(TOPIC, lambda: self._set(message))
 
     def on_joint_state(self, message: JointState) -> None:
         """Set joint angles and rates; a message that is wrong is refused and counted."""
+        self._take(JOINTS, lambda: self._set_joints(message))
+
+    def _take(self, topic: str, set_state: Callable[[], None]) -> None:
+        """Set a state by a message on ``topic``, or count that it was refused."""
         try:
-            self._set_joints(message)
+            set_state()
         except errors.ModelError as error:
-            self._counts.refuse(JOINTS, error)
+            self._counts.refuse(topic, error)
         else:
             self._after()
 
