@@ -273,13 +273,16 @@ def test_pushes_of_others_are_shown(node, remote, peer):
     wait(lambda: remote.status.real_time_factor == 0.4)
     sender = peer.sender(Wrench, 'ragdoll/force')
     peer.wait(lambda: sender.get_subscription_count() == 2)
+    found = ()
 
     def pushed():
         """Told again and again: a listener may hear the first before the page's has found it."""
+        nonlocal found
         sender.publish(Wrench(force=Vector3(x=2000.0)))
-        return remote.frame.pushes
+        found = remote.frame.pushes
+        return found
     wait(pushed)
-    assert remote.frame.pushes[0].bone == 'torso'
+    assert found[0].bone == 'torso'
     wait(lambda: not remote.frame.pushes)
 
 

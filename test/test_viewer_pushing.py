@@ -93,6 +93,8 @@ def test_follow_comes_on_when_the_doll_leaves_and_goes_with_a_reset():
         client.look((3.0, 0.0, 1.0), look_at=(0.0, 0.0, 1.0))
         begin = page.frame.time
         wait(lambda: page.frame.time > begin + 0.3)
+        # A tenth of real time, for the frame that is read to be that which switched it on.
+        page.source.set_real_time_factor(0.1)
         client.press(page, 'Push right')
         wait(lambda: page.display.follow.value)
         assert page.frame.state.positions[0][1] < 2.0  # where the picture ends
@@ -119,5 +121,8 @@ def test_what_is_pushed_is_chosen_by_a_click(page):
         name=batch.handle.name, instance_index=0, ray_origin=(4.0, 0.0, 1.0),
         ray_direction=(-1.0, 0.0, 0.0), screen_pos=(0.5, 0.5), modifier=None))
     wait(lambda: page.source.pushed_bone == 'head')
+    # While time stands the push stays: a tap may be over before the page draws again.
+    page.source.pause(True)
+    wait(lambda: page.source.status.paused)
     client.press(page, 'Push up')
     wait(lambda: any(push.bone == 'head' for push in page.frame.pushes))
