@@ -39,11 +39,13 @@ BRACKET = np.dtype([('low', float), ('high', float), ('moved', np.int64), ('halv
 it was last halved, and the chords since."""
 
 STEP_SCALARS = np.dtype([
-    ('start_contact_count', np.int64), ('seeks_impacts', np.int64), ('correction_energy', float),
-    ('start_load_potential', float), ('residual', float), ('solve_error', float)], align=True)
-"""Of a contact step: contacts at its start; whether it ends at impacts; potential energy that
-position correction adds, J; load_potential() at its start, J; the largest residual velocity of its
-large islands, m/s, and the share of the velocities that is allowed, see physics/accuracy.py."""
+    ('start_contact_count', np.int64), ('tried_count', np.int64), ('seeks_impacts', np.int64),
+    ('correction_energy', float), ('start_load_potential', float), ('residual', float),
+    ('solve_error', float)], align=True)
+"""Of a contact step: contacts at its start, and in its last trial if that was as long; whether it
+ends at impacts; potential energy that position correction adds, J; load_potential() at its start,
+J; the largest residual velocity of its large islands, m/s, and the share of the velocities that is
+allowed, see physics/accuracy.py."""
 
 OCCURRENCE = np.dtype([('member', np.int64), ('place', np.int64)], align=True)
 """A member of an island that a degree of freedom moves, and its place in the member's support."""
@@ -58,9 +60,9 @@ compliances, as shares of the diagonal of W, of position correction and of impul
 separates as the step begins."""
 
 Contacts = collections.namedtuple(
-    'Contacts', 'found start gaps_end gaps_active manifold motion joint_outside angles u v')
-"""Contacts (c,) that are ``found`` at a pose, and those at the ``start`` of the step. Gaps:
-``gaps_end`` at the end of a step; ``gaps_active``, by which contacts are found in it. ``manifold``:
+    'Contacts', 'found start tried gaps_end gaps_active manifold motion joint_outside angles u v')
+"""Contacts (c,) that are ``found`` at a pose, those at the ``start`` of the step, and those that
+were ``tried`` in its last trial. Gaps: ``gaps_end`` at the end of a step; ``gaps_active``, by which contacts are found in it. ``manifold``:
 of one pair. ``motion`` (n,); ``joint_outside`` (n,): whether the joint of a body is outside its
 limits. ``angles``, ``u``, ``v`` (c,): the corners of a patch in order, see patch.py."""
 
@@ -127,7 +129,7 @@ def make_workspace(system: System, cluster: ClusterState) -> Workspace:
         motion=np.zeros(bodies, FLIGHT_MOTION))
     found = Contacts(
         found=np.zeros(contacts, CONTACT), start=np.zeros(contacts, CONTACT),
-        gaps_end=np.zeros(gaps), gaps_active=np.zeros(gaps),
+        tried=np.zeros(contacts, CONTACT), gaps_end=np.zeros(gaps), gaps_active=np.zeros(gaps),
         manifold=np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT), motion=np.zeros(bodies, MOTION),
         joint_outside=np.zeros(bodies, np.int64), angles=np.zeros(max(contacts, 8)),
         u=np.zeros(max(contacts, 8)), v=np.zeros(max(contacts, 8)))

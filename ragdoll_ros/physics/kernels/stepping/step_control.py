@@ -114,6 +114,7 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             continue
         if not seek and turn < MAX_TRIES - 1 and activate_contacts(s, ws, length):
             ledger.new_contacts += 1
+            keep_tried(ws, m)
             continue
         overshot, landed, fast = impacts_at_end(s, ws, length)
         hit = seek and fast
@@ -144,6 +145,7 @@ def begin_trials(s: System, ws: Workspace, cluster: ClusterState, h: float,
     """
     copy_into(ws.contacts.gaps_active, ws.gaps)
     open_bracket(ws)
+    ws.step.scalars[0].tried_count = 0
     if ws.step.scalars[0].seeks_impacts:
         return h
     share = predict_contacts(s, ws, cluster, h, nominal)
@@ -219,6 +221,16 @@ def activate_contacts(s: System, ws: Workspace, h: float) -> bool:
             if active[j] > TOUCHING and end[j] < ws.gaps[j] - end[j]:
                 active[j] = min(end[j], TOUCHING)
     return some
+
+
+@compiled
+def keep_tried(ws: Workspace, m: int) -> None:
+    """Keep the m contacts of a trial, to begin the next one of the same length with their
+    impulses: islands without a new contact are solved already.
+    """
+    for i in range(m):
+        ws.contacts.tried[i] = ws.contacts.found[i]
+    ws.step.scalars[0].tried_count = m
 
 
 @compiled

@@ -32,19 +32,21 @@ def jam_threshold(s: System, ws: Workspace, h: float) -> float:
 @compiled
 def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) -> None:
     """Write to m found contacts the impulses of the ``known`` contacts of the last step with the
-    same ids, as initial ones, and whether they are persistent, with take_start().
+    same ids, as initial ones, and whether they are persistent, with take_start(). Those of the last
+    trial of this step, contacts.tried, come first.
 
     Impulses between jammed contacts are undetermined and would grow from step to step: above the
     threshold they begin at zero.
     """
     stats, pressed = ws.stats[0], 0.0
+    tried_count = ws.step.scalars[0].tried_count
     share = h / stats.last_dt if stats.last_dt > 0 else 0.0
     for j in range(stats.contact_count):
         pressed += abs(known[j].impulse[0])
     if share * pressed > jam_threshold(s, ws, h):
-        share = 0.0
+        share, tried_count = 0.0, 0
     start_count = ws.step.scalars[0].start_contact_count
-    j = k = 0
+    j = k = t = 0
     for i in range(m):
         c = ws.contacts.found[i]
         for e in range(5):
@@ -55,6 +57,10 @@ def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) ->
             is_new &= known[j].gap > MET
             for e in range(5):
                 c.impulse[e] = share * known[j].impulse[e]
+        t = find_id(ws.contacts.tried, tried_count, c.id, t)
+        if t < tried_count:
+            for e in range(5):
+                c.impulse[e] = ws.contacts.tried[t].impulse[e]
         k = find_id(ws.contacts.start, start_count, c.id, k)
         c.persistent = 1 if k < start_count and not (
             is_new and is_approaching(ws.contacts.start[k])) else 0
