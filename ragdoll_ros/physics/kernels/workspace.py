@@ -62,9 +62,10 @@ separates as the step begins."""
 Contacts = collections.namedtuple(
     'Contacts', 'found start tried gaps_end gaps_active manifold motion joint_outside angles u v')
 """Contacts (c,) that are ``found`` at a pose, those at the ``start`` of the step, and those that
-were ``tried`` in its last trial. Gaps: ``gaps_end`` at the end of a step; ``gaps_active``, by which contacts are found in it. ``manifold``:
-of one pair. ``motion`` (n,); ``joint_outside`` (n,): whether the joint of a body is outside its
-limits. ``angles``, ``u``, ``v`` (c,): the corners of a patch in order, see patch.py."""
+were ``tried`` in its last trial. Gaps: ``gaps_end`` at the end of a step; ``gaps_active``, by which
+contacts are found in it. ``manifold``: of one pair. ``motion`` (n,); ``joint_outside`` (n,):
+whether the joint of a body is outside its limits. ``angles``, ``u``, ``v`` (c,): the corners of a
+patch in order, see patch.py."""
 
 Island = collections.namedtuple(
     'Island', 'members label Y YT support place W G blocks rhs impulses free_velocity '

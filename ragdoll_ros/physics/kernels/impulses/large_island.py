@@ -20,9 +20,9 @@ from .one_contact import project_to_disc, solve_one_contact
 from .solver import OPENING, UNSOLVABLE, UNSOLVED, energy_bound_share, scale_to_no_work
 from .sparse_newton import find_sparsity, linearize, sparse_newton, write_velocities
 
-LARGE_ROUNDS, LARGE_SWEEPS = 2, 10
-"""Rounds of sweeps and of Newton's method, and sweeps in the first; in the second eight times as
-many. At rest few will do."""
+LARGE_ROUNDS, LARGE_SWEEPS = 3, 10
+"""Rounds of sweeps and of Newton's method, and sweeps in the first; in each other one twice as many
+as in the one before. At rest few will do."""
 
 MAX_SWEEPS = 100
 """Sweeps in one solve where Newton's method would cost more."""
@@ -131,7 +131,7 @@ def solve_rows(s: System, ws: Workspace, m: int, n: int, b: np.ndarray, p: np.nd
         if left <= tolerance:
             break
         left, sweeps = sweep_to_tolerance(ws, m, n, b, p, most, SWEPT_SHARE * tolerance)
-        done, most = done + sweeps, 8 * most
+        done, most = done + sweeps, 2 * most
         if left <= SWEPT_SHARE * tolerance:
             break
         dofs = prepare_newton(s, ws, m)

@@ -49,10 +49,10 @@ SAFETY = 0.9
 
 COARSEST = 0.03
 
-SPECULATIVE = 1e-4
+SPECULATIVE = 1e-3
 """m or rad: where times of impact are not sought, gaps that are narrower as a step begins, as well
-as those that would close at its velocities, are contacts of it from its first trial on. Those that
-do not close in it have no effect."""
+as those that would close in twice its length at its velocities, are contacts of it from its first
+trial on. Those that do not close in it have no effect."""
 
 
 @compiled
@@ -153,7 +153,8 @@ def begin_trials(s: System, ws: Workspace, cluster: ClusterState, h: float,
         h = max(share * h, COARSEST * nominal)
         predict_contacts(s, ws, cluster, h, nominal)
     for j in range(len(ws.gaps)):
-        if ws.contacts.gaps_end[j] < 0 or ws.gaps[j] < SPECULATIVE:
+        if ws.contacts.gaps_end[j] < ws.gaps[j] - ws.contacts.gaps_end[j] or (
+                ws.gaps[j] < SPECULATIVE):
             ws.contacts.gaps_active[j] = min(TOUCHING, ws.gaps[j], ws.contacts.gaps_end[j])
     return h
 
@@ -266,12 +267,13 @@ def solver_energy(s: System, ws: Workspace, m: int, h: float) -> float:
 
 @compiled
 def penetrates_further(s: System, ws: Workspace) -> bool:
-    """Whether something that touched ends deeper than MAX_PENETRATION or BEYOND_LIMIT, and by a
-    tenth of it deeper than at the start.
+    """Whether a contact of the step, also a speculative one, ends deeper than MAX_PENETRATION or
+    BEYOND_LIMIT, and by a tenth of it deeper than at the start.
     """
     for j in range(len(ws.gaps)):
         most = BEYOND_LIMIT if is_joint_limit_gap(s, ws.gaps, j) else MAX_PENETRATION
         end = ws.contacts.gaps_end[j]
-        if end < -most and ws.gaps[j] <= TOUCHING and end < ws.gaps[j] - most / 10:
+        if end < -most and ws.contacts.gaps_active[j] <= TOUCHING and (
+                end < ws.gaps[j] - most / 10):
             return True
     return False
