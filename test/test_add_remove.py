@@ -5,6 +5,7 @@ import dataclasses
 import gc
 import random
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import pytest
 from ragdoll_ros import Push, Simulation, load_doll
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
-from ragdoll_ros.model.scene import Ground, Placement, Scene
+from ragdoll_ros.model.scene import SECOND, Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.model.static_body import StaticBody
 from ragdoll_ros.model.swing import Swing, strand
@@ -48,6 +49,31 @@ def test_others_keep_their_bits(count, apart):
                 one.remove('ball')
             assert (one.advance().rows[:count * BONES] == other.advance().rows).all()
         assert one.time == other.time
+
+
+def test_what_is_prepared_beside_ticks_is_what_is_done_at_once():
+    """Prepared in a thread while ticks are made, also several at once; and told as one by one."""
+    newcomers = [Placement(DOLL, f'new{k}', (0.2 * k, 0.1, 1.5), spin=(1, 0, 0), angles={
+        'left_shin': 0.1}) for k in range(3)]
+    told = []
+    with LoggedSimulation(dolls(4, 0.3)) as one, Simulation(dolls(4, 0.3)) as other:
+        one.on_event = lambda name, given: told.append((name, given))
+        with ThreadPoolExecutor() as threads:
+            for prepare in (lambda: one.prepare_add(newcomers),
+                            lambda: one.prepare_remove('doll2')):
+                waiting = threads.submit(prepare)
+                while not waiting.done() or one.time < SECOND:
+                    assert (one.advance().rows == other.advance().rows).all()
+                one.carry_out(waiting.result())
+                while told:
+                    apply_event(other, *told.pop(0))
+        for _ in range(100):
+            assert (one.advance().rows == other.advance().rows).all()
+        assert one.energy_excess == other.energy_excess
+        stale = one.prepare_remove('doll0')
+        one.remove('doll1')
+        with pytest.raises(errors.WrongForm, match='another scene'):
+            one.carry_out(stale)
 
 
 def test_others_fall_asleep_and_sleep_on_as_without():

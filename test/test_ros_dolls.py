@@ -42,14 +42,14 @@ def test_topics_parameters_and_the_log_follow(make_node, peer, tmp_path, capsys)
     peer.wait(lambda: len(scenes) == 1)
     tick(10, 50.0)
     man = Placement(load_doll('man'), 'man', (0, 3, 1))
-    node.change_dolls(lambda simulation: simulation.add(man))
+    node.change_dolls(lambda simulation: simulation.prepare_add([man]))
     assert node.simulation is simulation and simulation.time == 10 * simulation.tick
     peer.wait(lambda: len(scenes) == 2 and len(poses[-1][1].poses) == 26)
     assert values('pushed_bone', 'imus') == ['doll/torso', ['doll/head 0 0 0.1']]
     assert tuple(*values('bone_names')) == simulation.scene.bone_names
     assert '/ragdoll/imu/doll/head/data_raw' in dict(node.get_topic_names_and_types())
     tick(HASH_INTERVAL, 20.0)
-    node.change_dolls(lambda simulation: simulation.remove('doll'))
+    node.change_dolls(lambda simulation: simulation.prepare_remove('doll'))
     peer.wait(lambda: len(scenes) == 3 and len(poses[-1][1].poses) == 16)
     assert values('pushed_bone', 'imus') == ['pelvis', ['']]
     tick(HASH_INTERVAL, 9.0)

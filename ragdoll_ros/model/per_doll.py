@@ -20,9 +20,10 @@ class PerDoll(Generic[Value]):
 
     def __getitem__(self, doll: Ragdoll) -> Value:
         """What was made for this doll, or is made now."""
-        if id(doll) not in self._kept:
-            self._kept[id(doll)] = doll, self._make(doll)
-        return self._kept[id(doll)][1]
+        kept = self._kept.get(id(doll))
+        if kept is None:
+            kept = self._kept[id(doll)] = doll, self._make(doll)
+        return kept[1]
 
     def keep(self, dolls: Iterable[Ragdoll]) -> None:
         """Forget all other dolls."""

@@ -15,10 +15,10 @@ from ..model import errors
 from ..model.coordinates import GeneralizedState
 from ..model.drive import Drive
 from ..model.push import Push
-from ..model.scene import Placement
 from ..model.state import State
 from .accuracy import Accuracy
 from .actions.grab import DRAG_TIME
+from .prepared_change import PreparedChange
 from .simulation import Simulation
 
 
@@ -118,15 +118,15 @@ class LoggedSimulation(Simulation):
                for key, values in joints.items() if values}})
         return state
 
-    def add(self, placement: Placement) -> State:
-        state = super().add(placement)
-        # That of the scene: its doll may be one that others share.
-        self.on_event('add', {'placement': self.scene.dolls[-1]})
-        return state
-
-    def remove(self, doll: str) -> State:
-        state = super().remove(doll)
-        self.on_event('remove', {'doll': doll})
+    def carry_out(self, prepared: PreparedChange) -> State:
+        state, change = super().carry_out(prepared), prepared.change
+        for placement, doll in zip(change.before.dolls, change.new_dolls, strict=True):
+            if doll < 0:
+                self.on_event('remove', {'doll': placement.name})
+        for placement, doll in zip(change.after.dolls, change.old_dolls, strict=True):
+            if doll < 0:
+                # That of the scene: its doll may be one that others share.
+                self.on_event('add', {'placement': placement})
         return state
 
     def reset(self, keep_time: bool = False) -> State:

@@ -28,6 +28,7 @@ from .actions.push_queue import PushQueue
 from .engine.capabilities import Capability, require
 from .engine.protocol import Contacts, Drives, Engine, Overlap, Springs, Wrenches
 from .engine.registry import resolve_engine
+from .prepared_change import PreparedChange
 from .rigid_body import GroundHeights, JointGap
 from .sensors.impacts import Impact, ImpactRecorder
 from .sleeping import SleepDetector
@@ -556,10 +557,7 @@ class Simulation:
         >>> simulation.remove('man').positions.shape
         (10, 3)
         """
-        dolls = self.scene.dolls
-        # Equal dolls share what is computed for them.
-        doll = next((one.doll for one in dolls if one.doll == placement.doll), placement.doll)
-        return self._change_scene((*dolls, dataclasses.replace(placement, doll=doll)))
+        return self.carry_out(self.prepare_add([placement]))
 
     def remove(self, doll: str) -> State:
         """Remove a doll and all that acts on it. What it touched wakes; all others keep their
@@ -569,8 +567,46 @@ class Simulation:
             UnknownDoll: the scene has no such doll.
             WrongForm: it is the only doll, or the engine is not rigid.
         """
+        return self.carry_out(self.prepare_remove(doll))
+
+    def prepare_add(self, placements: Sequence[Placement]) -> PreparedChange:
+        """Prepare to add dolls, for carry_out(): most of the work, which may be done in a thread
+        while this one calls advance(). Raises what add() raises.
+        """
+        dolls = list(self.scene.dolls)
+        for placement in placements:
+            # Equal dolls share what is computed for them.
+            doll = next((one.doll for one in dolls if one.doll == placement.doll), placement.doll)
+            dolls.append(dataclasses.replace(placement, doll=doll))
+        return self._prepare_dolls(dolls)
+
+    def prepare_remove(self, doll: str) -> PreparedChange:
+        """Prepare to remove a doll, as prepare_add(). Raises what remove() raises."""
         index = self._doll_index(doll)
-        return self._change_scene(self.scene.dolls[:index] + self.scene.dolls[index + 1:])
+        return self._prepare_dolls(self.scene.dolls[:index] + self.scene.dolls[index + 1:])
+
+    def carry_out(self, prepared: PreparedChange) -> State:
+        """Go on with other dolls: those that stay in the states that they have, to the bit.
+
+        Raises:
+            WrongForm: other dolls have come or gone since it was prepared.
+        """
+        if prepared.change.before is not self.scene:
+            raise errors.WrongForm('prepared', 'for another scene', 'that of this scene')
+        old, change = self._engine, prepared.change
+        clusters, gone = old.cluster_of_doll, change.new_dolls < 0
+        self._sleep_detector.restart(np.isin(clusters, clusters[gone]))
+        self.scene, self._overlaps, self._placed = change.after, None, prepared.placed
+        self._follows = any(placement.follow for placement in self.scene.dolls)
+        self._engine, self._start = prepared.engine, prepared.start
+        self._engine.continue_from(old, change)
+        if self._impact_recorder is not None:
+            dropped = self._impact_recorder.dropped
+            self.record_impacts(self._impact_recorder.limits)
+            self._impact_recorder.dropped = dropped
+        old.close()
+        self._carry_over(prepared)
+        return self.state
 
     def checkpoint(self) -> tuple[int, object]:
         """Save time and state for go_back(); cheap enough for every tick."""
@@ -671,51 +707,40 @@ class Simulation:
         """Raise WrongForm if the engine lacks a capability."""
         require(capability, self.capabilities, self.engine_name)
 
-    def _make_engine(self, accuracy: Accuracy, before: Engine | None = None) -> Engine:
-        """A new engine at the start of the scene; ``before``: that of other dolls."""
-        engine: Engine = before.with_dolls(self.scene) if before else (
-            self._make(self.scene, accuracy))
+    def _make_engine(self, accuracy: Accuracy) -> Engine:
+        """A new engine at the start of the scene."""
+        engine: Engine = self._make(self.scene, accuracy)
         if self._placed is not None:
             engine.set_coordinates(self._placed)
         return engine
 
-    def _change_scene(self, dolls: Sequence[Placement]) -> State:
-        """Go on with these dolls: those that stay in the states that they have."""
-        old = self._engine
+    def _prepare_dolls(self, dolls: Sequence[Placement]) -> PreparedChange:
+        """Prepare a change of the dolls: an engine at the start of the scene after it."""
         self._require(Capability.SCENE_CHANGES)
         change = SceneChange(self.scene, dataclasses.replace(self.scene, dolls=tuple(dolls)))
-        clusters, gone = old.cluster_of_doll, change.new_dolls < 0
-        self._sleep_detector.restart(np.isin(clusters, clusters[gone]))
-        if self._placed is not None or any(
-                placement.angles or placement.rates for placement in dolls):
-            self._placed = changed_coordinates(
-                self._placed or placed_coordinates(self.scene.dolls), change)
-        self.scene, self._overlaps = change.after, None
-        self._follows = any(placement.follow for placement in dolls)
-        self._engine = self._make_engine(old.accuracy, old)
-        self._start = self._engine.save()
-        self._engine.continue_from(old, change)
-        if self._impact_recorder is not None:
-            dropped = self._impact_recorder.dropped
-            self.record_impacts(self._impact_recorder.limits)
-            self._impact_recorder.dropped = dropped
-        old.close()
-        self._carry_over(change)
-        return self.state
+        placed = self._placed
+        if placed is not None or any(placement.angles or placement.rates for placement in dolls):
+            placed = changed_coordinates(placed or placed_coordinates(self.scene.dolls), change)
+        engine = self._engine.with_dolls(change.after)
+        if placed is not None:
+            engine.set_coordinates(placed)
+        return PreparedChange(change, placed, engine, engine.save(), SleepDetector(change.after),
+                              StabilityTest(change.after, engine.layout), _swings(change.after))
 
-    def _carry_over(self, change: SceneChange) -> None:
+    def _carry_over(self, prepared: PreparedChange) -> None:
         """Let all that is beside the engine go on in the scene after a change."""
+        change = prepared.change
         self.asleep, self.substates = bool(self._engine.sleeping.all()), (self.state,)
         self._pushes.change_scene(change)
         self._driven.change_scene(change, self.state)
         self._hands.change_scene(change)
         self._joint_springs = self._joint_springs.changed(change)
-        detector, self._sleep_detector = self._sleep_detector, SleepDetector(self.scene)
+        detector, self._sleep_detector = self._sleep_detector, prepared.sleep_detector
         self._sleep_detector.continue_from(detector, change)
-        self._stability_test = StabilityTest(self.scene, self._engine.layout)
+        self._stability_test = prepared.stability_test
         for name in ('_gap', '_heights', '_yields'):
             self.__dict__.pop(name, None)
-        before, self._swings = self._swings, _swings(self.scene)
+        before, self._swings = self._swings, prepared.swings
         if self._swings and before:
             self._swings = before.changed(self._swings, change, self.time, self.state)
         elif self._swings:

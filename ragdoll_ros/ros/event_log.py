@@ -18,6 +18,7 @@ Floats are written so that they are read back to the same bits.
 from __future__ import annotations
 
 import json
+from typing import NamedTuple
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -36,6 +37,13 @@ EVENTS_QOS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """A late recorder gets the past events: without them a run cannot be repeated."""
 
 
+class RunScene(NamedTuple):
+    """A scene as it is published, and the digest by which events refer to it."""
+
+    text: str
+    digest: str
+
+
 class EventLog:
     """Publisher of ~/events and ~/scene."""
 
@@ -47,14 +55,17 @@ class EventLog:
         self._texts = PerDoll(doll_text)
         self._number = self._tick = 0
 
-    def set_simulation(self, simulation: LoggedSimulation) -> None:
+    def prepare(self, scene: Scene) -> RunScene:
+        """What is published of a scene; this may run beside the ticks."""
+        self._texts.keep(placement.doll for placement in scene.dolls)
+        text = run_scene_text(scene, self._texts)
+        return RunScene(text, scene_digest(text))
+
+    def set_simulation(self, simulation: LoggedSimulation, prepared: RunScene) -> None:
         """Log this simulation from now on, and publish its scene if that is another one."""
         if simulation.scene is not self._scene:
-            self._scene = simulation.scene
-            self._texts.keep(placement.doll for placement in self._scene.dolls)
-            text = run_scene_text(self._scene, self._texts)
-            self._digest = scene_digest(text)
-            self._scenes.publish(String(data=text))
+            self._scene, self._digest = simulation.scene, prepared.digest
+            self._scenes.publish(String(data=prepared.text))
         if simulation is self._simulation:
             return
         self._simulation, simulation.on_event = simulation, self.publish

@@ -5,6 +5,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
@@ -20,10 +21,10 @@ from rclpy.waitable import Waitable
 from ..files.scene import load_scene
 from ..model import errors
 from ..model.scene import Scene
-from ..model.scene_change import SceneChange
+from ..physics.prepared_change import PreparedChange
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics, DuplicateNodes, overlaps_text
-from .event_log import EventLog
+from .event_log import EventLog, RunScene
 from .impacts.publisher import ImpactPublisher
 from .imu.publishers import ImuPublishers
 from .inputs.body_subscriptions import BodySubscriptions
@@ -32,7 +33,8 @@ from .inputs.interactive_marker_server import InteractiveMarkerServer
 from .inputs.state_subscription import StateSubscription
 from .inputs.subscriptions import PushSubscriptions
 from .log_lines import end_line, start_line
-from .outputs import Outputs
+from .messages.interactive_markers import InteractiveMarkers
+from .outputs import Outputs, PreparedOutputs
 from .parameters.node_settings import SPECS, NodeSettings
 from .parameters.parameters import Parameters, make_simulation
 from .process.rclpy_context import rclpy_context
@@ -57,6 +59,14 @@ EXAMPLE = """examples:
   ragdoll_node --ros-args -p scene:=crowd -p real_time_factor:=0.5
   ragdoll_node --ros-args -p scene:=/path/to/my_scene.yaml
 """
+
+
+class PreparedScene(NamedTuple):
+    """What the parts of the node need for a scene."""
+
+    run_scene: RunScene
+    outputs: PreparedOutputs
+    markers: InteractiveMarkers
 
 
 class RagdollNode(Node):
@@ -161,19 +171,22 @@ class RagdollNode(Node):
         """What ``make`` returns, which runs in a thread while the ticks go on."""
         return self._ticker.run_beside(make)
 
-    def change_dolls(self, change: Callable[[Simulation], object]) -> None:
-        """Add or remove dolls by ``change(simulation)``; time goes on, topics and parameters
-        follow. Raises what it raises.
+    def change_dolls(self, prepare: Callable[[Simulation], PreparedChange]) -> None:
+        """Add or remove dolls as ``prepare(simulation)`` says, beside the ticks; time goes on,
+        topics and parameters follow. Raises what it raises.
         """
-        before = self.simulation.scene
-        try:
-            change(self.simulation)
-        finally:
-            after = self.simulation.scene
-            if after is not before:
-                self._node_parameters.follow(SceneChange(before, after))
-                self._set_simulation(self.simulation)
-                self._show_if_paused()
+        def prepared() -> tuple[Simulation, PreparedChange, PreparedScene]:
+            simulation = self.simulation
+            made = prepare(simulation)
+            return simulation, made, self._prepare_scene(made.change.after, self.settings)
+
+        simulation, change, scene = self.run_beside(prepared)
+        if simulation is not self.simulation:  # restarted, as it failed
+            simulation, change, scene = prepared()
+        simulation.carry_out(change)
+        self._node_parameters.follow(change.change)
+        self._set_simulation(simulation, scene)
+        self._show_if_paused()
 
     def pause(self, paused: bool) -> None:
         """Pause, or resume."""
@@ -259,19 +272,28 @@ class RagdollNode(Node):
         if self.paused:
             self._outputs.republish(self.simulation, self.stamp)
 
-    def _set_simulation(self, simulation: Simulation) -> None:
+    def _prepare_scene(self, scene: Scene, settings: NodeSettings) -> PreparedScene:
+        """What all parts of the node need for a scene; this may run beside the ticks."""
+        return PreparedScene(
+            self._event_log.prepare(scene),
+            self._outputs.prepare(scene, settings.frame_id, settings.publish_tf),
+            self.interactive.prepare(scene, settings.frame_id))
+
+    def _set_simulation(self, simulation: Simulation,
+                        prepared: PreparedScene | None = None) -> None:
         """Connect a simulation and the current settings to all parts of the node."""
-        self._event_log.set_simulation(simulation)
+        prepared = prepared or self._prepare_scene(simulation.scene, self.settings)
+        self._event_log.set_simulation(simulation, prepared.run_scene)
         self.simulation = self.inputs.simulation = self.states.simulation = simulation
         self.bodies.simulation = simulation
         self._diagnostics.simulation = simulation
         self.inputs.settings = self.states.settings = self.settings
         self.recovery.set_simulation(simulation)
         self._outputs.set_scene(simulation.scene, self.settings.frame_id,
-                                self.settings.publish_tf)
+                                self.settings.publish_tf, prepared.outputs)
         self._imus.configure(simulation.scene, self.settings)
         self._impacts.configure(self.settings)
-        self.interactive.set_simulation(simulation, self.settings)
+        self.interactive.set_simulation(simulation, self.settings, prepared.markers)
 
     def _log_start(self) -> None:
         self.get_logger().info(start_line(self.simulation, self.settings, self))

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
@@ -17,6 +17,7 @@ from visualization_msgs.msg import MarkerArray
 from ..files.urdf import scene_to_urdf, urdf_tree
 from ..model.per_doll import PerDoll
 from ..model.scene import Scene
+from .humans.body import Body
 from .humans.publishers import Humans
 from .latched_topic import LATCHED, LATCHED_HISTORY, LatchedTopic, overridable_publisher
 from .messages.contact_wrenches import to_contact_wrenches
@@ -24,13 +25,24 @@ from .messages.convert import contact_poses, count_masses, poses_of, to_time, tw
 from .messages.measures import TickMeasures, checksum, serialize_measures
 from .messages.serialized import serialize_pose_array
 from .messages.templates import SceneTemplates
-from .messages.tf import TfPublisher
+from .messages.tf import TfPublisher, TfTemplate
 
 if TYPE_CHECKING:  # else the page, which imports this file, would load an engine
     from ..physics.simulation import Simulation
 
 MARKER_PERIOD = 33_000_000
 """ns of the steady clock between two MarkerArrays: 30 Hz, enough for a screen."""
+
+
+class PreparedOutputs(NamedTuple):
+    """What is published of a scene as a whole, and the templates of what is published of states."""
+
+    description: str
+    """Of robot_description."""
+    checksum: str
+    templates: SceneTemplates
+    tf: TfTemplate | None
+    humans: list[Body]
 
 
 class Outputs:
@@ -49,24 +61,35 @@ class Outputs:
         self._wrenches = overridable_publisher(node, MultiDOFJointState, '~/contact_wrenches', 10)
         self._markers = LatchedTopic(node, MarkerArray, '~/markers')
         self._urdf_trees = PerDoll(urdf_tree)
+        self._templates: SceneTemplates | None = None
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._tf = TfPublisher(node)
         self.humans = Humans(node)
         self._clock: Publisher | None = None
 
-    def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
-        """Prepare the templates for a scene and publish its URDF; ``frame``: the world frame."""
-        self._templates, self._frame = SceneTemplates(scene, frame), frame
+    def prepare(self, scene: Scene, frame: str, publish_tf: str) -> PreparedOutputs:
+        """What set_scene() takes; this may run beside the ticks."""
+        self._urdf_trees.keep(placement.doll for placement in scene.dolls)
+        description = scene_to_urdf(scene, frame, self._urdf_trees)
+        templates = SceneTemplates(scene, frame)
+        if self._templates is not None:
+            templates.make_as(self._templates)
+        return PreparedOutputs(description, checksum(description), templates,
+                               self._tf.prepare(scene, frame, publish_tf),
+                               self.humans.prepare(scene))
+
+    def set_scene(self, scene: Scene, frame: str, publish_tf: str,
+                  prepared: PreparedOutputs) -> None:
+        """Publish a scene's URDF, and its states from now on; ``frame``: the world frame."""
+        self._templates, self._frame = prepared.templates, frame
         self._set_swings_publisher(count_masses(scene) > 0)
         self._next_markers = 0
         self._pending: list[Callable[[Simulation, int], None]] = []
         """What has not published the last tick, for want of subscribers."""
-        self._tf.set_scene(scene, frame, publish_tf)
-        self.humans.set_scene(scene, frame, publish_tf)
-        self._urdf_trees.keep(placement.doll for placement in scene.dolls)
-        description = scene_to_urdf(scene, frame, self._urdf_trees)
-        self._urdf = checksum(description)
-        self._description.publish(String(data=description))
+        self._tf.set_scene(scene, frame, publish_tf, prepared.tf)
+        self.humans.set_scene(prepared.humans, frame, publish_tf)
+        self._urdf = prepared.checksum
+        self._description.publish(String(data=prepared.description))
 
     @property
     def has_subscribers(self) -> bool:

@@ -137,11 +137,13 @@ class Ticker:
             while not done.wait(pause):
                 begin = time.monotonic()
                 if self._running:
+                    self._caught_up = True
                     self._on_timer()
                 # As long as the ticks took: on a busy machine they would leave nothing to it.
                 pause = max(MIN_TIMER_PERIOD / 1e9, time.monotonic() - begin)
         finally:
             sys.setswitchinterval(interval)
+            self._caught_up = True  # the timer's next wake-up is a late one
         if failures:
             raise failures[0]
         return results[0]

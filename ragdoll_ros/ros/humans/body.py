@@ -5,6 +5,7 @@ import dataclasses
 import itertools
 import re
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,23 +43,40 @@ class Body:
         return f'body_{self.id}'
 
 
-def bodies(scene: Scene, most: int, urdfs: PerDoll[str] | None = None) -> list[Body]:
-    """The first persons of a scene, at most so many. ``urdfs``: of body_urdf, kept from scene to
+class Person(NamedTuple):
+    """What all bodies of equal dolls share: names of the angles and, if it is a person, the frame
+    and the URDF with ANY_ID for the id.
+    """
+
+    angle_names: tuple[str, ...]
+    frame: Pose | None = None
+    urdf: str = ''
+
+    @classmethod
+    def of(cls, doll: Ragdoll) -> Person:
+        """That of a doll."""
+        names = tuple(name for joint in doll.joints for name in joint.angle_names)
+        if set(names) >= JOINTS:
+            return cls(names, doll.root.pose.relative(_mid_hips(doll)), body_urdf(doll))
+        return cls(names)
+
+
+def bodies(scene: Scene, most: int, persons: PerDoll[Person] | None = None) -> list[Body]:
+    """The first persons of a scene, at most so many. ``persons``: of Person.of, kept from scene to
     scene.
     """
     found, ids, first = [], set(), 0
-    urdfs = urdfs or PerDoll(body_urdf)
-    for placement in scene.dolls:
+    persons = persons or PerDoll(Person.of)
+    for placement, own in zip(scene.dolls, scene.bone_slices, strict=True):
         doll = placement.doll
-        names = [name for joint in doll.joints for name in joint.angle_names]
-        if set(names) >= JOINTS and len(found) < most:
+        names, frame, urdf = persons[doll]
+        if frame is not None and len(found) < most:
             body_id = _id(placement.name, ids)
             ids.add(body_id)
             found.append(Body(
-                body_id, scene.bone_index(scene.qualified(placement, doll.root.name)),
+                body_id, own.start + doll.bones.index(doll.root),
                 np.arange(first, first + len(names)), tuple(f'{name}_{body_id}' for name in names),
-                doll.root.pose.relative(_mid_hips(doll)),
-                urdfs[doll].replace(ANY_ID, body_id)))
+                frame, urdf.replace(ANY_ID, body_id)))
         first += len(names)
     return found
 

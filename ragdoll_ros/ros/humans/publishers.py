@@ -16,7 +16,7 @@ from ..latched_topic import LATCHED
 from ..messages.convert import to_header, to_joint_state
 from ..messages.serialized import SerializedTemplate
 from ..messages.tf import DEPTH, TFMessage, to_tf
-from .body import Body, bodies, body_urdf
+from .body import Body, Person, bodies
 
 if TYPE_CHECKING:
     from ...physics.simulation import Simulation
@@ -45,25 +45,40 @@ class Humans:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._bodies: list[BodyPublishers] = []
-        self._urdfs = PerDoll(body_urdf)
+        self._persons = PerDoll(Person.of)
+        self._is_told = False
         self._tracked: Publisher | None = None
         self._tf: Publisher | None = None
         self.status = ''
         """For /diagnostics: the ids, or why nothing is published; empty without persons."""
 
-    def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
-        """Publish the URDFs of a scene's persons; ``frame`` names the world frame."""
-        self._urdfs.keep(placement.doll for placement in scene.dolls)
+    def prepare(self, scene: Scene) -> list[Body]:
+        """The persons of a scene; this may run beside the ticks."""
+        self._persons.keep(placement.doll for placement in scene.dolls)
         # One is enough to say that it is not published.
-        self._frame, found = frame, bodies(scene, 1 if IdsList is None else MAX_BODIES,
-                                           self._urdfs)
-        self._destroy()
-        self.status = ', '.join(body.id for body in found)
+        return bodies(scene, 1 if IdsList is None else MAX_BODIES, self._persons)
+
+    def set_scene(self, found: list[Body], frame: str, publish_tf: str) -> None:
+        """Publish the URDFs of a scene's persons; ``frame`` names the world frame."""
+        self._frame, self.status = frame, ', '.join(body.id for body in found)
         if found and IdsList is None:
             self.status = f'not published, as hri_msgs is not installed: {MISSING}'
-            self._node.get_logger().info(f'/humans is {self.status}', once=True)
-        elif found:
-            self._create(found, publish_tf != 'none' and TFMessage is not None)
+            if not self._is_told:
+                self._is_told = True
+                self._node.get_logger().info(f'/humans is {self.status}')
+            return
+        self._set_common(bool(found), publish_tf != 'none' and TFMessage is not None)
+        before = {(each.body.id, each.body.urdf): each for each in self._bodies}
+        self._bodies = []
+        for body in found:
+            kept = before.pop((body.id, body.urdf), None)
+            self._bodies.append(kept._replace(body=body) if kept else self._created(body))
+        for each in before.values():
+            self._node.destroy_publisher(each.joints)
+            self._node.destroy_publisher(each.urdf)
+        if found:
+            self._tracked.publish(IdsList(header=to_header(0, self._frame),
+                                          ids=[body.id for body in found]))
 
     @property
     def has_subscribers(self) -> bool:
@@ -90,27 +105,29 @@ class Humans:
             edges = [(self._frame, body.frame_name) for body in found]
             self._tf.publish(to_tf(edges, stamp, body_poses(found, simulation)))
 
-    def _create(self, found: list[Body], with_tf: bool) -> None:
-        create = self._node.create_publisher
-        self._tracked = create(IdsList, '/humans/bodies/tracked', LATCHED)
-        self._tracked.publish(IdsList(header=to_header(0, self._frame),
-                                      ids=[body.id for body in found]))
-        self._tf = create(TFMessage, '/tf', DEPTH) if with_tf else None
-        for body in found:
-            topic, count = f'/humans/bodies/{body.id}', len(body.joint_names)
-            self._bodies.append(BodyPublishers(
-                body, create(JointState, f'{topic}/joint_states', 10),
-                create(String, f'{topic}/urdf', LATCHED),
-                SerializedTemplate.trace(partial(to_joint_state, body.frame_name,
-                                                 body.joint_names), (count,), (count,))))
-            self._bodies[-1].urdf.publish(String(data=body.urdf))
+    def _set_common(self, some: bool, with_tf: bool) -> None:
+        """Create or destroy the publishers of all persons: ids and, with_tf, frames."""
+        for name, wanted, kind, topic, qos in (
+                ('_tracked', some, IdsList, '/humans/bodies/tracked', LATCHED),
+                ('_tf', some and with_tf, TFMessage, '/tf', DEPTH)):
+            publisher = getattr(self, name)
+            if wanted and publisher is None:
+                setattr(self, name, self._node.create_publisher(kind, topic, qos))
+            elif publisher is not None and not wanted:
+                self._node.destroy_publisher(publisher)
+                setattr(self, name, None)
 
-    def _destroy(self) -> None:
-        publishers = [self._tracked, self._tf, *(each.joints for each in self._bodies),
-                      *(each.urdf for each in self._bodies)]
-        for publisher in filter(None, publishers):
-            self._node.destroy_publisher(publisher)
-        self._bodies, self._tracked, self._tf = [], None, None
+    def _created(self, body: Body) -> BodyPublishers:
+        """Publishers of a body; its URDF is published."""
+        create, topic = self._node.create_publisher, f'/humans/bodies/{body.id}'
+        count = len(body.joint_names)
+        made = BodyPublishers(
+            body, create(JointState, f'{topic}/joint_states', 10),
+            create(String, f'{topic}/urdf', LATCHED),
+            SerializedTemplate.trace(partial(to_joint_state, body.frame_name, body.joint_names),
+                                     (count,), (count,)))
+        made.urdf.publish(String(data=body.urdf))
+        return made
 
 
 def body_poses(found: list[Body], simulation: Simulation) -> np.ndarray:

@@ -35,6 +35,7 @@ from visualization_msgs.srv import GetInteractiveMarkers
 
 from ...model import errors, rotation
 from ...model.ragdoll import WORLD
+from ...model.scene import Scene
 from ...physics.actions.grab import DRAG_TIME
 from ...physics.simulation import Simulation
 from ..messages.interactive_markers import InteractiveMarkers
@@ -78,18 +79,28 @@ class InteractiveMarkerServer:
         node.create_service(GetInteractiveMarkers, '~/interactive/get_interactive_markers',
                             self._get_markers)
 
-    def set_simulation(self, simulation: Simulation, settings: NodeSettings) -> None:
-        """Publish the markers of this simulation's scene and erase those of the last one's."""
+    def prepare(self, scene: Scene, frame: str) -> InteractiveMarkers:
+        """Markers of a scene; this may run beside the ticks."""
+        markers = InteractiveMarkers(scene, frame, self._server_id)
+        if self._updates.get_subscription_count():
+            markers.make_template()
+        return markers
+
+    def set_simulation(self, simulation: Simulation, settings: NodeSettings,
+                       markers: InteractiveMarkers) -> None:
+        """Publish the markers of this simulation's scene and erase those of the last one's. Of a
+        simulation whose dolls have changed, those of the new dolls.
+        """
         last = frozenset() if self._markers is None else self._markers.names
+        known = last if simulation is self._simulation and (
+            settings.frame_id == self.settings.frame_id) else frozenset()
         if simulation is not self._simulation:
             self._drags.clear()
-        self._simulation, self.settings = simulation, settings
-        markers = self._markers = InteractiveMarkers(simulation.scene, settings.frame_id,
-                                                     self._server_id)
+        self._simulation, self.settings, self._markers = simulation, settings, markers
         self._sequence += 1
         if self._updates.get_subscription_count():
             self._updates.publish(markers.make_update(
-                self._sequence, markers=markers.at(simulation.state),
+                self._sequence, markers=markers.at(simulation.state, markers.names - known),
                 erases=sorted(last - markers.names)))
 
     def publish(self, now: int, paused: bool = False) -> None:
@@ -171,7 +182,7 @@ class InteractiveMarkerServer:
     def _get_markers(self, _: GetInteractiveMarkers.Request,
                      response: GetInteractiveMarkers.Response) -> GetInteractiveMarkers.Response:
         response.sequence_number = self._sequence
-        response.markers = self._markers.at(self._simulation.state)
+        response.markers = self._markers.at(self._simulation.state, self._markers.names)
         return response
 
 

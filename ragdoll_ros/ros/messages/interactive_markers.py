@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import copy
-from functools import cached_property
+from collections.abc import Collection
 
 import numpy as np
 from std_msgs.msg import Header
@@ -42,12 +42,17 @@ class InteractiveMarkers:
         self._scene, self._server_id = scene, server_id
         self._header = Header(frame_id=frame)
         self.names = frozenset(scene.bone_names)
+        self._template: SerializedTemplate | None = None
 
-    def at(self, state: State) -> list[InteractiveMarker]:
-        """A marker at each bone's pose; markers of equal bones share their controls."""
+    def at(self, state: State, names: Collection[str]) -> list[InteractiveMarker]:
+        """A marker at the pose of each bone of these names; markers of equal bones share their
+        controls.
+        """
         models, markers = {}, []
         for name, bone, row in zip(self._scene.bone_names, self._scene.bones,
                                    poses_of(state).tolist(), strict=True):
+            if name not in names:
+                continue
             if id(bone) not in models:
                 models[id(bone)] = _marker(bone, self._header)
             marker = copy.copy(models[id(bone)])
@@ -57,6 +62,8 @@ class InteractiveMarkers:
 
     def serialize_update(self, sequence: int, state: State) -> bytes:
         """Serialized update of all poses, with this sequence number."""
+        if self._template is None:
+            self.make_template()
         number = np.array([sequence], np.uint64).view(float)
         return self._template.serialize(0, number, poses_of(state))
 
@@ -65,9 +72,10 @@ class InteractiveMarkers:
         return InteractiveMarkerUpdate(server_id=self._server_id, seq_num=sequence,
                                        type=InteractiveMarkerUpdate.UPDATE, **content)
 
-    @cached_property
-    def _template(self) -> SerializedTemplate:
-        return SerializedTemplate.trace(self._pose_update, (1,), (len(self._scene.bones), 7))
+    def make_template(self) -> None:
+        """Make what serialize_update() needs."""
+        self._template = SerializedTemplate.trace(self._pose_update, (1,),
+                                                  (len(self._scene.bones), 7))
 
     def _pose_update(self, _: int, sequence: np.ndarray,
                      poses: np.ndarray) -> InteractiveMarkerUpdate:

@@ -17,6 +17,11 @@ class SceneTemplates:
     def __init__(self, scene: Scene, frame: str) -> None:
         self._scene, self._frame = scene, frame
 
+    def make_as(self, others: SceneTemplates) -> None:
+        """Make those templates that ``others`` has: they will be asked for."""
+        for name in vars(others).copy().keys() - vars(self).keys():
+            getattr(self, name)
+
     @cached_property
     def poses(self) -> SerializedTemplate:
         """PoseArray of the bones' poses (n, 7)."""

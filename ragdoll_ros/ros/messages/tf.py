@@ -49,18 +49,31 @@ class TfPublisher:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher: Publisher | None = None
-
-    def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
-        """Prepare for a scene; ``frame`` names the world frame, ``publish_tf``: see PUBLISH_TF."""
-        self._make_template = partial(TfTemplate, scene, frame, publish_tf == 'root')
         self._template: TfTemplate | None = None
+        self._is_told = False
+
+    def prepare(self, scene: Scene, frame: str, publish_tf: str) -> TfTemplate | None:
+        """The template for another scene, if that of this one has been needed; this may run beside
+        the ticks.
+        """
+        return TfTemplate(scene, frame, publish_tf == 'root') if self._template else None
+
+    def set_scene(self, scene: Scene, frame: str, publish_tf: str,
+                  template: TfTemplate | None = None) -> None:
+        """Publish a scene's frames; ``frame`` names the world frame, ``publish_tf``: see
+        PUBLISH_TF, ``template``: of prepare().
+        """
+        self._make_template = partial(TfTemplate, scene, frame, publish_tf == 'root')
+        self._template = template
         self._subscribers = 0
         if publish_tf == 'none' and self._publisher is not None:
             self._node.destroy_publisher(self._publisher)
             self._publisher = None
         elif publish_tf != 'none' and TFMessage is None:
-            self._node.get_logger().info(
-                f'/tf is not published, as tf2_msgs is not installed: {MISSING}', once=True)
+            if not self._is_told:
+                self._is_told = True
+                self._node.get_logger().info(
+                    f'/tf is not published, as tf2_msgs is not installed: {MISSING}')
         elif publish_tf != 'none' and self._publisher is None:
             self._publisher = self._node.create_publisher(TFMessage, '/tf', DEPTH)
 

@@ -93,8 +93,11 @@ class Parameters:
         named = {'pushed_bone': names.get(self.settings.pushed_bone)
                  or scene_defaults(change.after)['pushed_bone'],
                  'imus': renamed_imus(self.settings.imus, change)}
-        self.settings = dataclasses.replace(self.settings, **named)
-        self._node.set_parameters([Parameter(name, value=value) for name, value in named.items()])
+        renamed = [Parameter(name, value=value) for name, value in named.items()
+                   if value != getattr(self.settings, name)]
+        if renamed:
+            self.settings = dataclasses.replace(self.settings, **named)
+            self._node.set_parameters(renamed)
         self._set_bone_names()
 
     def is_unchanged_read_only(self, parameter: Parameter) -> bool:

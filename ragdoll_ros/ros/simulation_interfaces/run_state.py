@@ -8,6 +8,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import Protocol, TypeVar
 
+from ...physics.prepared_change import PreparedChange
 from ...physics.simulation import Simulation
 from ..parameters.node_settings import NodeSettings
 from ..services import Controlled
@@ -48,8 +49,8 @@ class ControlledNode(Controlled, Protocol):
     def run_beside(self, make: Callable[[], Result]) -> Result:
         """What ``make`` returns; ticks go on meanwhile."""
 
-    def change_dolls(self, change: Callable[[Simulation], object]) -> None:
-        """Add or remove dolls by ``change(simulation)``; time goes on, topics follow."""
+    def change_dolls(self, prepare: Callable[[Simulation], PreparedChange]) -> None:
+        """Add or remove dolls as ``prepare(simulation)`` says; time goes on, topics follow."""
 
 
 class RunState:

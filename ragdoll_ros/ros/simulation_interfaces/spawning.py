@@ -18,6 +18,7 @@ from ...model.scene import Placement, Scene
 from ...model.vectors import unit_vector
 from ...physics.actions.grab import checked_point
 from ...physics.engine.capabilities import Capability
+from ...physics.prepared_change import PreparedChange
 from ...physics.simulation import Simulation
 from ..messages.convert import to_vector
 from .bounds import Kind
@@ -76,13 +77,13 @@ class SpawnServices:
         own = {id(placement) for placement in self._world.dolls}
         spawned = [placement.name for placement in self._controlled.simulation.scene.dolls
                    if id(placement) not in own]
-        self._controlled.change_dolls(lambda simulation: [
-            simulation.remove(name) for name in spawned])
+        for name in spawned:
+            self._remove(name)
 
     def _spawn(self, request: Any, response: Any) -> None:
         self._check_engine()
         placed, response.result.error_message = self._placed(request, {}, self._taken())
-        self._change(lambda simulation: simulation.add(placed))
+        self._add([placed])
         response.entity_name = placed.name
 
     def _spawn_several(self, request: Any, response: Any) -> None:
@@ -104,7 +105,7 @@ class SpawnServices:
             except Refusal as refused:
                 made.result.result, made.result.error_message = refused.code, str(refused)
         if spawned:
-            self._change(lambda simulation: [simulation.add(placed) for placed in spawned])
+            self._add(spawned)
         failed = len(response.results) - len(spawned)
         if failed:
             raise Refusal(ENTITIES_SPAWN_FAILED,
@@ -141,7 +142,7 @@ class SpawnServices:
         if not entity.doll:
             raise Refusal(Code.FEATURE_UNSUPPORTED, f'{entity.name} is ' + (
                 'a static body, which stays' if entity.body else 'a bone: delete its doll'))
-        self._change(lambda simulation: simulation.remove(entity.doll))
+        self._remove(entity.doll)
 
     def _get_spawnables(self, request: Any, response: Any) -> None:
         """Sources that are no folders are named, and hinder nothing."""
@@ -156,12 +157,19 @@ class SpawnServices:
                 made.spawn_bounds.points = [to_vector(corner) for corner in each.box[::-1]]
             response.spawnables.append(made)
 
-    def _change(self, change: Callable[[Simulation], object]) -> None:
-        """Add or remove a doll; before the first change, note the world."""
+    def _add(self, placements: list[Placement]) -> None:
+        """Add dolls, all at once."""
+        self._change(lambda simulation: simulation.prepare_add(placements))
+
+    def _remove(self, doll: str) -> None:
+        self._change(lambda simulation: simulation.prepare_remove(doll))
+
+    def _change(self, prepare: Callable[[Simulation], PreparedChange]) -> None:
+        """Change the dolls; before the first change, note the world."""
         simulation = self._controlled.simulation
         if simulation is not self._simulation:
             self._simulation, self._world = simulation, simulation.scene
-        self._controlled.change_dolls(change)
+        self._controlled.change_dolls(prepare)
 
     def _check_engine(self) -> None:
         simulation = self._controlled.simulation
