@@ -122,6 +122,8 @@ def test_numbers_of_single_services_are_those_of_the_messages():
                                                           'INCORRECT_TRANSITION')),
             (worlds, srv.LoadWorld.Response, ('UNSUPPORTED_FORMAT', 'NO_RESOURCE',
                                               'RESOURCE_PARSE_ERROR')),
+            (worlds, srv.UnloadWorld.Response, ('NO_WORLD_LOADED',)),
+            (worlds, srv.GetCurrentWorld.Response, ('NO_WORLD_LOADED',)),
             (entities, srv.SetEntityState.Response, ('INVALID_POSE',)),
             (spawning, srv.SpawnEntity.Response, (
                 'NAME_NOT_UNIQUE', 'NAME_INVALID', 'NAMESPACE_INVALID', 'INVALID_POSE')),
@@ -152,7 +154,8 @@ def test_features_are_those_of_the_services_that_there_are(node, call):
         'get_simulation_state': {'SIMULATION_STATE_GETTING'},
         'set_simulation_state': {'SIMULATION_STATE_SETTING', 'SIMULATION_STATE_PAUSE'},
         'step_simulation': {'STEP_SIMULATION_SINGLE', 'STEP_SIMULATION_MULTIPLE'},
-        'load_world': {'WORLD_LOADING'}, 'get_current_world': {'WORLD_INFO_GETTING'},
+        'load_world': {'WORLD_LOADING'}, 'unload_world': {'WORLD_UNLOADING'},
+        'get_current_world': {'WORLD_INFO_GETTING'},
         'get_available_worlds': {'AVAILABLE_WORLDS'}, 'get_simulator_features': set(),
         'simulate_steps/_action/send_goal': {'STEP_SIMULATION_ACTION'}}
     told = call('GetSimulatorFeatures').features
@@ -162,7 +165,7 @@ def test_features_are_those_of_the_services_that_there_are(node, call):
     assert served == {f'/ragdoll/{name}' for name in by_service}
     assert set(told.features) == {getattr(msg.SimulatorFeatures, name)
                                   for names in by_service.values() for name in names}
-    assert node.simulation_interfaces.status == '19 services, 1 action'
+    assert node.simulation_interfaces.status == '20 services, 1 action'
 
 
 def test_states_follow_each_other_and_the_node_s_own_services(node, peer, call):
@@ -197,8 +200,9 @@ def test_others_are_served_during_steps_and_may_end_them(node, peer, call):
     peer.wait(client.service_is_ready)
     for name, fields, words in (
             ('SetSimulationState', {'state': {'state': 1}}, 'resumed after'),
-            ('ResetSimulation', {'scope': 0}, 'reset, or another scene, after'),
-            ('LoadWorld', resource('drop'), 'reset, or another scene, after')):
+            ('ResetSimulation', {'scope': 0}, 'reset, or another scene or none, after'),
+            ('LoadWorld', resource('drop'), 'reset, or another scene or none, after'),
+            ('UnloadWorld', {}, 'reset, or another scene or none, after')):
         if not node.paused:
             call('SetSimulationState', state={'state': 2})
         before = node.simulation.time
@@ -390,6 +394,78 @@ def test_worlds_are_the_scenes(node, peer, call, tmp_path):
     assert code(call('GetAvailableWorlds', filter={'tags': ['indoor']})) == 0
 
 
+def test_after_unloading_there_is_no_world_until_one_is_loaded(node, peer, call):
+    """Each service that needs one says so, with the standard's code for a wrong state."""
+    poses = peer.collect(PoseArray, '/ragdoll/poses')
+    peer.wait_heard(node, '/ragdoll/poses')
+    call('SetSimulationState', state={'state': 1})
+    peer.wait(lambda: poses)
+    features = list(call('GetSimulatorFeatures').features.features)
+    assert code(call('UnloadWorld')) == 1 and state(call) == 4
+    count, counted = len(poses), node.input_counts.refused.total()
+    needy = {'ResetSimulation', 'StepSimulation', 'GetEntities', 'GetEntitiesStates',
+             'GetEntityState', 'SetEntityState', 'GetEntityInfo', 'SetEntityInfo',
+             'GetEntityBounds', 'SpawnEntity', 'SpawnEntities', 'DeleteEntity'}
+    for name in sorted(needy):
+        response = call(name)
+        assert code(response) == 3 and 'no world is loaded' in response.result.error_message
+        assert not getattr(response, 'entities', ())
+    for target, wrong in ((0, 103), (1, 103), (2, 103), (4, 101), (5, 103)):
+        assert code(call('SetSimulationState', state={'state': target})) == wrong
+    assert code(call('GetCurrentWorld')) == 101 == code(call('UnloadWorld'))
+    assert node.input_counts.refused.total() == counted + len(needy) + 7
+    assert list(call('GetSimulatorFeatures').features.features) == features
+    assert code(call('GetSpawnables')) == 1 == code(call('GetAvailableWorlds'))
+    assert code(call('LoadWorld', **resource('nowhere'))) == 2 and state(call) == 4
+    assert len(poses) == count
+    assert code(call('LoadWorld', **resource('drop'))) == 1 and state(call) == 0
+    assert list(call('GetEntities').entities) == ['doll']
+    call('SetSimulationState', state={'state': 1})
+    peer.wait(lambda: len(poses) > count)
+    assert len(poses[-1][1].poses) == 10
+
+
+def large(folder):
+    """A scene that takes seconds to load, as a path."""
+    path = folder / 'large.yaml'
+    path.write_text('name: large\nground: {}\ndolls:\n' + ''.join(
+        f'  - {{doll: doll, name: doll{k}, position: [{3 * (k % 30)}, {3 * (k // 30)}, 2]}}\n'
+        for k in range(900)))
+    return str(path)
+
+
+def test_a_load_goes_on_beside_all_else_until_it_is_cancelled(node, peer, call, tmp_path):
+    """The present world goes on; what comes while one loads is served, or ends the load."""
+    client = peer.create_client(srv.LoadWorld, '/ragdoll/load_world')
+    peer.wait(client.service_is_ready)
+    request = srv.LoadWorld.Request()
+    fill(request, resource(large(tmp_path)))
+    for name, fields, after, scene in (
+            ('LoadWorld', resource('drop'), 0, 'drop'),
+            ('SetSimulationState', {'state': {'state': 0}}, 0, 'drop'),
+            ('UnloadWorld', {}, 4, None), ('UnloadWorld', {}, 4, None)):
+        if node.has_world:
+            call('SetSimulationState', state={'state': 1})
+        waiting = client.call_async(request)
+        peer.wait(lambda: state(call) == 5)
+        if node.has_world:
+            before = node.simulation.time
+            peer.wait(lambda before=before: node.simulation.time > before)
+            assert code(call('GetEntities')) == 1
+        for target in (1, 2):
+            assert code(call('SetSimulationState', state={'state': target})) == 103
+        assert not waiting.done()
+        assert code(call(name, **fields)) == 1
+        peer.wait(waiting.done)
+        assert code(waiting.result()) == 4
+        assert 'cancelled: ' in waiting.result().result.error_message
+        assert state(call) == after and node.has_world == bool(scene)
+        assert not scene or node.simulation.scene.name == scene
+    waiting = client.call_async(request)
+    peer.wait(waiting.done)
+    assert code(waiting.result()) == 1 and len(call('GetEntities').entities) == 900
+
+
 def test_dolls_are_spawned_and_deleted_while_time_goes_on(node, call):
     call('StepSimulation', steps=5)
     time, before = node.simulation.time, node.simulation.state.rows.tobytes()
@@ -560,14 +636,16 @@ def test_nothing_that_is_called_harms_the_node(node, peer):
     chance = random.Random(7)
     names = [name for name in dir(srv) if name[0].isupper()
              and f'/ragdoll/{snake_case(name)}' in dict(node.get_service_names_and_types())]
-    assert len(names) == 19
-    for count in range(570):
-        name = names[count % 19]
+    assert len(names) == 20
+    for count in range(600):
+        name = names[count % 20]
         request = getattr(srv, name).Request()
         for field, kind in request.get_fields_and_field_types().items():
             setattr(request, field, rubbish(chance, kind))
         if name != 'SetSimulationState' or request.state.state != 3:
             peer.call(getattr(srv, name), f'/ragdoll/{snake_case(name)}', request)
+    if not node.has_world:
+        node.set_parameters([Parameter('scene', value='drop')])
     node.pause(True)
     before = node.simulation.time
     response = peer.call(srv.StepSimulation, '/ragdoll/step_simulation',
@@ -577,8 +655,19 @@ def test_nothing_that_is_called_harms_the_node(node, peer):
     assert np.isfinite(node.simulation.state.rows).all()
 
 
-def test_quitting_ends_the_process_with_0(peer):
+@pytest.mark.parametrize('loads', [False, True])
+def test_quitting_ends_the_process_with_0(peer, tmp_path, nothing_runs_on, loads):
+    """Also while a world loads."""
     process = start('node', '--ros-args', '-r', '__ns:=/other')
+    if loads:
+        client = peer.create_client(srv.LoadWorld, '/other/ragdoll/load_world')
+        peer.wait(client.service_is_ready)
+        request = srv.LoadWorld.Request()
+        fill(request, resource(large(tmp_path)))
+        client.call_async(request)
+        peer.wait(lambda: peer.call(
+            srv.GetSimulationState, '/other/ragdoll/get_simulation_state',
+            srv.GetSimulationState.Request()).state.state == 5)
     request = srv.SetSimulationState.Request()
     request.state.state = msg.SimulationState.STATE_QUITTING
     assert code(peer.call(srv.SetSimulationState, '/other/ragdoll/set_simulation_state',

@@ -276,6 +276,11 @@ uint64 steps 1
 ---
 Result result
 """,
+    'srv/UnloadWorld.srv': """
+---
+uint8 NO_WORLD_LOADED=101
+Result result
+""",
     'action/SimulateSteps.action': """
 uint64 steps
 ---

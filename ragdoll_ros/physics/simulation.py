@@ -685,8 +685,9 @@ class Simulation:
 
     def close(self) -> None:
         """Release the engine; further calls do nothing."""
+        capabilities = self._engine.capabilities
         self._engine.close()
-        self._engine = cast(Engine, _ClosedEngine())
+        self._engine = cast(Engine, _ClosedEngine(capabilities))
 
     def _doll_index(self, doll: str) -> int:
         names = [placement.name for placement in self.scene.dolls]
@@ -854,6 +855,9 @@ def _swings(scene: Scene) -> SwingSimulation | None:
 
 class _ClosedEngine:
     """Replaces the engine after close()."""
+
+    def __init__(self, capabilities: frozenset[Capability]) -> None:
+        self.capabilities = capabilities
 
     def close(self) -> None:
         """Do nothing."""

@@ -77,7 +77,7 @@ def _recording(path: Path) -> Recording:
     for topic, kind, data in read_messages(path, lambda text: print(text, file=sys.stderr)):
         last = topic.rpartition('/')[2]
         if TOPIC_TYPES.get(last) == kind == cdr.STRING:
-            scenes.add(cdr.decode_string(data))
+            scenes |= {cdr.decode_string(data)} - {''}  # empty: no world
         elif TOPIC_TYPES.get(last) == kind:
             messages[last].append(cdr.decode_poses(data))
     if len(scenes) != 1 or not messages['poses']:

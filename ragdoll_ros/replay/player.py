@@ -74,6 +74,8 @@ class Player:
             self._begin(event)
         elif self.simulation is None or event.kind in PASSIVE_KINDS:
             return
+        elif event.kind == 'unload':
+            self.close()
         elif event.kind == 'state':
             self._check(event.fields.get('sha256'))
         elif event.kind != 'accuracy' or self._accuracy is None:

@@ -68,7 +68,7 @@ def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> Repla
     if not any(event.is_start for event in events):
         raise errors.WrongForm('', f'{len(events)} events', 'one that starts a run: where a '
                                'recording begins late, call ~/reset while it records')
-    texts = found.get((name, 'scene'), [])
+    texts = filter(None, found.get((name, 'scene'), []))  # empty: no world
     read = {scene_digest(text): read_run_scene(text) for text in texts}
     return ReplayedRun(name, events, {digest: scene for digest, (scene, _) in read.items()},
                        tuple(sorted({versions for _, versions in read.values()})))

@@ -14,6 +14,7 @@ from ..model.push import Push
 from ..model.scene import SECOND
 from ..physics.engine.capabilities import Capability
 from .inputs.input_counts import InputCounts
+from .inputs.no_world import NO_WORLD
 from .messages.convert import to_time
 
 if TYPE_CHECKING:  # else the page and the teleop, which import this file, would load an engine
@@ -45,7 +46,8 @@ class Diagnostics:
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._last_counted = self._last_dropped = self._last_bad = 0
         self._last: dict[str, float] | None = None
-        self.simulation: Simulation
+        self.simulation: Simulation | None = None
+        """None: there is no world."""
         self.restart()
         node.create_timer(PERIOD, self._on_timer, clock=steady)
 
@@ -65,7 +67,8 @@ class Diagnostics:
         level, message = self._level_and_message()
         status = DiagnosticStatus(
             level=level, name=status_name(self._node.get_namespace(), self._node.get_name()),
-            message=message, hardware_id=self.simulation.scene.name,
+            message=message,
+            hardware_id=self.simulation.scene.name if self.simulation is not None else '',
             values=[KeyValue(key=key, value=_text(value)) for key, value in self._values().items()])
         array = DiagnosticArray(status=[status])
         array.header.stamp = to_time(self._stamp())
@@ -114,6 +117,8 @@ class Diagnostics:
                 [f'{bad} bad states were not published: {values["bad_state"]}{dump}', *warnings])
         if warnings:
             return DiagnosticStatus.WARN, '; '.join(warnings)
+        if self.simulation is None:
+            return DiagnosticStatus.OK, NO_WORLD
         return DiagnosticStatus.OK, 'running' if requested else 'paused'
 
     def _lag_warnings(self, requested: float, values: dict) -> list[str]:
@@ -134,13 +139,14 @@ class Diagnostics:
         simulation, counts = self.simulation, self._counts
         return {
             **self._last,
-            'engine': simulation.engine_name,
-            'engine_reason': simulation.engine_reason,
-            'simulated_time': simulation.time / SECOND,
-            'initial_overlaps': overlaps_text(simulation),
-            'push': pushes_text(simulation.pushes),
+            **({} if simulation is None else {
+                'engine': simulation.engine_name,
+                'engine_reason': simulation.engine_reason,
+                'simulated_time': simulation.time / SECOND,
+                'initial_overlaps': overlaps_text(simulation),
+                'push': pushes_text(simulation.pushes)}),
             **self._node_values(),
-            **simulation.measures(),
+            **({} if simulation is None else simulation.measures()),
             'refused': counts.refused.total(),
             'clamped': counts.clamped.total(),
             'last_reason': counts.last_reason,

@@ -11,6 +11,7 @@ shows; ``tick`` is the number of ticks made before it; the other fields depend o
   a call of the simulation (physics/logged_simulation.py) with its arguments
 - add: likewise; ``placement`` is YAML, as a scene of the doll alone
 - state: ``sha256`` of the state, every HASH_INTERVAL ticks, while there is a subscriber
+- unload: the end of the world; no ticks are made until the next start
 - pause, parameters: for information; their effects on the simulation are events of their own
 
 Floats are written so that they are read back to the same bits.
@@ -70,6 +71,14 @@ class EventLog:
             return
         self._simulation, simulation.on_event = simulation, self.publish
         self.publish('start', {**simulation.conditions, 'state': state_digest(simulation.state)})
+
+    def unload(self) -> None:
+        """Log that there is no world; the text on ~/scene is empty."""
+        self.publish('unload', {})
+        if self._simulation is not None:
+            del self._simulation.on_event
+        self._scene = self._simulation = None
+        self._scenes.publish(String())
 
     def publish(self, kind: str, fields: dict) -> None:
         """Publish an event."""

@@ -21,6 +21,7 @@ from rclpy.waitable import Waitable
 from ..files.scene import load_scene
 from ..model import errors
 from ..model.scene import Scene
+from ..physics.logged_simulation import LoggedSimulation
 from ..physics.prepared_change import PreparedChange
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics, DuplicateNodes, overlaps_text
@@ -30,6 +31,7 @@ from .imu.publishers import ImuPublishers
 from .inputs.body_subscriptions import BodySubscriptions
 from .inputs.input_counts import InputCounts
 from .inputs.interactive_marker_server import InteractiveMarkerServer
+from .inputs.no_world import NO_WORLD, NoWorld
 from .inputs.state_subscription import StateSubscription
 from .inputs.subscriptions import PushSubscriptions
 from .log_lines import end_line, start_line
@@ -69,6 +71,15 @@ class PreparedScene(NamedTuple):
     markers: InteractiveMarkers
 
 
+class LoadedWorld(NamedTuple):
+    """A scene with all that the node needs for it with these settings."""
+
+    scene: Scene
+    settings: NodeSettings
+    simulation: LoggedSimulation
+    prepared: PreparedScene
+
+
 class RagdollNode(Node):
     """The node ``ragdoll``. Options are those of rclpy's Node.
 
@@ -87,7 +98,11 @@ class RagdollNode(Node):
         self.input_counts = InputCounts(self.get_logger())
         self._node_parameters = Parameters(self, self._parameter_overrides)
         self.simulation = make_simulation(self._node_parameters.scene, self.settings)
-        self._prepared: Simulation | None = None
+        self.has_world = True
+        self._loaded: LoadedWorld | None = None
+        """What use_world() is to set the parameter `scene` for."""
+        self._prepared: LoadedWorld | None = None
+        """What the change of parameters that is being made needs."""
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._stamps = Stamps(self._ros_time)
         self._outputs, self._imus = Outputs(self), ImuPublishers(self)
@@ -188,6 +203,34 @@ class RagdollNode(Node):
         self._set_simulation(simulation, scene)
         self._show_if_paused()
 
+    def load_world(self, name: str) -> LoadedWorld:
+        """The scene that a value of the parameter `scene` names, for use_world(). This may run
+        beside the ticks of the present one. Raises a RagdollError.
+        """
+        scene = load_scene(name)
+        return self._made_world(scene, self._node_parameters.with_scene(name, scene))
+
+    def use_world(self, loaded: LoadedWorld) -> SetParametersResult:
+        """Set the parameter `scene` to what has been loaded: it replaces the present one."""
+        self._loaded = loaded
+        return self.set_parameters_atomically([Parameter('scene', value=loaded.settings.scene)])
+
+    def unload_world(self) -> None:
+        """End the world: nothing is simulated or published until another one is loaded."""
+        self._ticker.stop()
+        self._impacts.stop()
+        self.has_world, self.paused = False, True
+        self._event_log.unload()
+        self.simulation.close()
+        self.inputs.simulation = self.states.simulation = self.bodies.simulation = NoWorld()
+        self._diagnostics.simulation = None
+        self._outputs.unload()
+        self.interactive.unload()
+        self._node_parameters.unload()
+        self.get_logger().info(NO_WORLD)
+        self._diagnostics.restart()
+        self._diagnostics.publish()
+
     def pause(self, paused: bool) -> None:
         """Pause, or resume."""
         self.paused = paused
@@ -219,9 +262,9 @@ class RagdollNode(Node):
 
     def destroy_node(self) -> None:
         """Close the simulation and destroy the node."""
-        for simulation in (getattr(self, 'simulation', None), getattr(self, '_prepared', None)):
-            if simulation is not None:
-                simulation.close()
+        for holder in (self, getattr(self, '_prepared', None)):
+            if hasattr(holder, 'simulation'):
+                holder.simulation.close()
         if hasattr(self, 'simulation_interfaces'):
             self.simulation_interfaces.destroy()
         super().destroy_node()
@@ -269,7 +312,7 @@ class RagdollNode(Node):
         """
         self._duplicate_nodes.update()
         self.inputs.cmd_vel.check_publishers()
-        if self.paused:
+        if self.paused and self.has_world:
             self._outputs.republish(self.simulation, self.stamp)
 
     def _prepare_scene(self, scene: Scene, settings: NodeSettings) -> PreparedScene:
@@ -284,8 +327,9 @@ class RagdollNode(Node):
         """Connect a simulation and the current settings to all parts of the node."""
         prepared = prepared or self._prepare_scene(simulation.scene, self.settings)
         self._event_log.set_simulation(simulation, prepared.run_scene)
+        self.has_world = True
         self.simulation = self.inputs.simulation = self.states.simulation = simulation
-        self.bodies.simulation = simulation
+        self.bodies.set_simulation(simulation)
         self._diagnostics.simulation = simulation
         self.inputs.settings = self.states.settings = self.settings
         self.recovery.set_simulation(simulation)
@@ -300,22 +344,33 @@ class RagdollNode(Node):
         if (overlaps := overlaps_text(self.simulation)) not in ('none', 'unknown'):
             self.get_logger().warning(f'overlaps at the start: {overlaps}')
 
-    def _replace(self, simulation: Simulation) -> None:
+    def _replace(self, simulation: Simulation, prepared: PreparedScene | None = None) -> None:
         self._impacts.stop()
         self.simulation.close()
-        self._set_simulation(simulation)
+        self._set_simulation(simulation, prepared)
 
     def _load(self, name: str) -> Scene:
-        """Load a scene, beside the ticks of the present one."""
+        """Load a scene, beside the ticks of the present one, unless that has been done."""
+        if self._loaded is not None and self._loaded.settings.scene == name:
+            return self._loaded.scene
         return self.run_beside(lambda: load_scene(name))
+
+    def _made_world(self, scene: Scene, settings: NodeSettings) -> LoadedWorld:
+        return LoadedWorld(scene, settings, make_simulation(scene, settings),
+                           self._prepare_scene(scene, settings))
 
     def _prepare(self, changed: set[str], settings: NodeSettings, scene: Scene) -> None:
         """Before a change is accepted, create the simulation that it needs, as that may fail."""
+        loaded, self._loaded = self._loaded, None
         if self._prepared is not None:
-            self._prepared.close()
+            self._prepared.simulation.close()
+        self._prepared = loaded
+        if loaded is not None and (loaded.scene is not scene or loaded.settings != settings):
+            loaded.simulation.close()  # parameters have changed since it was loaded
             self._prepared = None
-        if changed & {'scene', 'engine', 'workers'}:
-            self._prepared = self.run_beside(lambda: make_simulation(scene, settings))
+        if self._prepared is None and ('scene' in changed or (
+                self.has_world and changed & {'engine', 'workers'})):
+            self._prepared = self.run_beside(lambda: self._made_world(scene, settings))
 
     def _apply(self, changed: set[str]) -> None:
         """Carry out a change of the settings."""
@@ -325,10 +380,12 @@ class RagdollNode(Node):
                                                for name in sorted(changed)})
         self._outputs.set_clock_publisher(settings.publish_clock)
         if self._prepared is not None:
-            simulation, self._prepared = self._prepared, None
-            self._replace(simulation)
+            prepared, self._prepared = self._prepared, None
+            self._replace(prepared.simulation, prepared.prepared)
             self._log_start()
             self._publish_start()
+        elif not self.has_world:
+            return  # what is loaded next has them
         elif changed & {'frame_id', 'publish_tf'}:
             self._set_simulation(self.simulation)
             if self.paused:

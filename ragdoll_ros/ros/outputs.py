@@ -12,7 +12,7 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import String
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ..files.urdf import scene_to_urdf, urdf_tree
 from ..model.per_doll import PerDoll
@@ -79,8 +79,9 @@ class Outputs:
                                self.humans.prepare(scene))
 
     def set_scene(self, scene: Scene, frame: str, publish_tf: str,
-                  prepared: PreparedOutputs) -> None:
+                  prepared: PreparedOutputs | None = None) -> None:
         """Publish a scene's URDF, and its states from now on; ``frame``: the world frame."""
+        prepared = prepared or self.prepare(scene, frame, publish_tf)
         self._templates, self._frame = prepared.templates, frame
         self._set_swings_publisher(count_masses(scene) > 0)
         self._next_markers = 0
@@ -90,6 +91,17 @@ class Outputs:
         self.humans.set_scene(prepared.humans, frame, publish_tf)
         self._urdf = prepared.checksum
         self._description.publish(String(data=prepared.description))
+
+    def unload(self) -> None:
+        """End what is shown: late subscribers get no state and an empty URDF, and all markers are
+        deleted.
+        """
+        self._pending = []
+        for topic in filter(None, (self._measures, self._swings, self._poses)):
+            topic.forget()
+        self._markers.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
+        self.humans.set_scene([], self._frame, 'none')
+        self._description.publish(String())
 
     @property
     def has_subscribers(self) -> bool:

@@ -1,6 +1,8 @@
 """The services ~/reset, ~/step and ~/pause."""
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
 from rclpy.node import Node
@@ -9,12 +11,14 @@ from std_srvs.srv import SetBool, Trigger
 from ..model.scene import SECOND
 from ..physics.simulation import Simulation
 from .inputs.input_counts import InputCounts
+from .inputs.no_world import NO_WORLD
 
 
 class Controlled(Protocol):
     """What the services act on: the ragdoll node."""
 
     simulation: Simulation
+    has_world: bool
     paused: bool
     input_counts: InputCounts
 
@@ -33,9 +37,17 @@ class Services:
 
     def __init__(self, node: Node, controlled: Controlled) -> None:
         self._controlled = controlled
-        node.create_service(Trigger, '~/reset', self._reset)
-        node.create_service(Trigger, '~/step', self._step)
-        node.create_service(SetBool, '~/pause', self._pause)
+        for kind, name, serve in ((Trigger, '~/reset', self._reset),
+                                  (Trigger, '~/step', self._step),
+                                  (SetBool, '~/pause', self._pause)):
+            node.create_service(kind, name, partial(self._serve, name, serve))
+
+    def _serve(self, name: str, serve: Callable, request: object, response: object) -> object:
+        """Answer, or refuse without a world."""
+        if self._controlled.has_world:
+            return serve(request, response)
+        self._controlled.input_counts.refuse(name, NO_WORLD)
+        return _respond(response, False, NO_WORLD)
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Reset to the start; a paused node stays paused."""

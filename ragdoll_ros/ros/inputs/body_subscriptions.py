@@ -32,16 +32,11 @@ class BodySubscriptions:
         self._node, self._counts, self._after = node, counts, after
         self._subscriptions: list[Subscription] = []
         self._names: tuple[str, ...] = ()
-        self._simulation: Simulation
+        self.simulation: Simulation
 
-    @property
-    def simulation(self) -> Simulation:
-        """Whose bodies are moved; the subscriptions are those of its scene."""
-        return self._simulation
-
-    @simulation.setter
-    def simulation(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+    def set_simulation(self, simulation: Simulation) -> None:
+        """Move the bodies of this simulation, and subscribe for those of its scene."""
+        self.simulation = simulation
         names = tuple(each.name for each in simulation.scene.dolls if each.follow)
         if names == self._names:
             return
@@ -81,18 +76,18 @@ class BodySubscriptions:
         parts = [rotation.rotate(orientation, limited(
             self._counts, source, f'twist.{key}', getattr(twist, key), MAX_SPEED, 'the limit'))
             for key in ('linear', 'angular')]
-        self._simulation.drive_body(name, pose, [*parts[0].tolist(), *parts[1].tolist()])
+        self.simulation.drive_body(name, pose, [*parts[0].tolist(), *parts[1].tolist()])
         self._after()
 
     def _orientation(self, name: str) -> Sequence[float]:
         """Orientation (4,) of a body's frame now."""
         placement, bone = self._placed(name)
         axes = placement.doll.root.pose.relative(Pose()).orientation
-        return rotation.multiply(self._simulation.state.orientations[bone], axes).tolist()
+        return rotation.multiply(self.simulation.state.orientations[bone], axes).tolist()
 
     def _placed(self, name: str) -> tuple[Placement, int]:
         """A body and its bone."""
-        scene = self._simulation.scene
+        scene = self.simulation.scene
         return next((placement, own.start) for placement, own in zip(
             scene.dolls, scene.bone_slices, strict=True) if placement.name == name)
 

@@ -42,6 +42,7 @@ from ..messages.interactive_markers import InteractiveMarkers
 from ..outputs import MARKER_PERIOD
 from ..parameters.node_settings import NodeSettings
 from .input_counts import InputCounts
+from .no_world import NoWorldLoaded
 
 DEPTH = 100
 """Queue depth of both topics, that of the interactive_markers package."""
@@ -103,6 +104,15 @@ class InteractiveMarkerServer:
                 self._sequence, markers=markers.at(simulation.state, markers.names - known),
                 erases=sorted(last - markers.names)))
 
+    def unload(self) -> None:
+        """Erase all markers: there is no world."""
+        self._drags.clear()
+        self._sequence += 1
+        if self._markers is not None and self._updates.get_subscription_count():
+            self._updates.publish(self._markers.make_update(
+                self._sequence, erases=sorted(self._markers.names)))
+        self._markers = self._simulation = None
+
     def publish(self, now: int, paused: bool = False) -> None:
         """Publish the poses at ``now``, ns, and end the drags of clients that are gone.
 
@@ -145,7 +155,9 @@ class InteractiveMarkerServer:
                                       DRAG_TIME * self.settings.real_time_factor)
 
     def _check(self, message: InteractiveMarkerFeedback) -> None:
-        """Raise a ModelError for an unknown marker, frame or event."""
+        """Raise a ModelError for an unknown marker, frame or event, or without a world."""
+        if self._markers is None:
+            raise NoWorldLoaded
         frame = message.header.frame_id
         if message.marker_name not in self._markers.names:
             names = self._simulation.scene.bone_names
@@ -182,7 +194,8 @@ class InteractiveMarkerServer:
     def _get_markers(self, _: GetInteractiveMarkers.Request,
                      response: GetInteractiveMarkers.Response) -> GetInteractiveMarkers.Response:
         response.sequence_number = self._sequence
-        response.markers = self._markers.at(self._simulation.state, self._markers.names)
+        if self._markers is not None:
+            response.markers = self._markers.at(self._simulation.state, self._markers.names)
         return response
 
 

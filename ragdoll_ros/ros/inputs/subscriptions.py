@@ -117,10 +117,13 @@ class PushSubscriptions:
         """Push the pushed bone in the world frame, or the bone of frame_id in its own frame."""
         settings, frame = self.settings, message.header.frame_id
         local = frame not in (WORLD, settings.frame_id)
-        if local and frame not in self.simulation.scene.bone_names:
-            expected = ', '.join((WORLD, *self.simulation.scene.bone_names))
-            self._counts.refuse('~/push', errors.UnknownBone(
-                'header.frame_id', frame, f'one of {expected}'))
+        try:
+            names = self.simulation.scene.bone_names
+            if local and frame not in names:
+                raise errors.UnknownBone('header.frame_id', frame,
+                                         f'one of {", ".join((WORLD, *names))}')
+        except errors.ModelError as error:
+            self._counts.refuse('~/push', error)
             return
         bone = frame if local else settings.pushed_bone
         self._push('~/push', f'push {frame if local else WORLD}', bone, message.wrench, local)

@@ -98,7 +98,17 @@ class Parameters:
         if renamed:
             self.settings = dataclasses.replace(self.settings, **named)
             self._node.set_parameters(renamed)
-        self._set_bone_names()
+        self._set_bone_names(self.scene.bone_names)
+
+    def with_scene(self, name: str, scene: Scene) -> NodeSettings:
+        """The settings with another scene. Raises a RagdollError if they do not fit it."""
+        settings = self._settings_with({'scene': name}, scene)
+        check(settings, scene)
+        return settings
+
+    def unload(self) -> None:
+        """Have no bones, as there is no world."""
+        self._set_bone_names([])
 
     def is_unchanged_read_only(self, parameter: Parameter) -> bool:
         """Whether it is read-only and has this value, as in a parameter dump that is loaded."""
@@ -130,8 +140,7 @@ class Parameters:
         given = _settable(parameters)
         try:
             scene = self._load(given['scene']) if 'scene' in given else self.scene
-            settings = dataclasses.replace(self.settings,
-                                           **{**self._new_scene_defaults(scene), **given})
+            settings = self._settings_with(given, scene)
             changed = self._changed(given, settings)
             if changed:  # what has been checked need not be again, as dolls come and go
                 check(settings, scene)
@@ -149,7 +158,7 @@ class Parameters:
         self._node.set_parameters([Parameter(name, value=getattr(self.settings, name))
                                    for name in changed - set(_settable(parameters))])
         if 'scene' in changed:
-            self._set_bone_names()
+            self._set_bone_names(self.scene.bone_names)
 
     def _changed(self, given: dict, settings: NodeSettings) -> set[str]:
         """Names of parameters with a new value; a scene that is set again is reloaded."""
@@ -157,18 +166,21 @@ class Parameters:
                    if getattr(settings, name) != getattr(self.settings, name)}
         return changed | ({'scene'} & set(given))
 
+    def _settings_with(self, given: dict, scene: Scene) -> NodeSettings:
+        return dataclasses.replace(self.settings, **{**self._new_scene_defaults(scene), **given})
+
     def _new_scene_defaults(self, scene: Scene) -> dict:
         """The scene's defaults of the parameters that are at the default of the last scene."""
         before = scene_defaults(self.scene)
         return {name: value for name, value in scene_defaults(scene).items()
                 if getattr(self.settings, name) == before[name]}
 
-    def _set_bone_names(self) -> None:
+    def _set_bone_names(self, names: Iterable[str]) -> None:
         """Change the read-only parameter, as only the node may."""
         descriptor = self._node.describe_parameter(BONE_NAMES)
         descriptor.read_only = False
         self._node.set_parameters([Parameter(
-            BONE_NAMES, Parameter.Type.STRING_ARRAY, list(self.scene.bone_names))])
+            BONE_NAMES, Parameter.Type.STRING_ARRAY, list(names))])
         descriptor.read_only = True
 
 

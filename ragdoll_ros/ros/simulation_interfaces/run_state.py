@@ -6,13 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from ...physics.prepared_change import PreparedChange
 from ...physics.simulation import Simulation
+from ..inputs.no_world import NO_WORLD
 from ..parameters.node_settings import NodeSettings
 from ..services import Controlled
 from .codes import Code, Refusal
+from .resources.world_loader import Loaded, WorldLoader
+
+if TYPE_CHECKING:
+    from rcl_interfaces.msg import SetParametersResult
 
 ALREADY_IN_TARGET_STATE, INCORRECT_TRANSITION = 101, 103
 """Results of SetSimulationState."""
@@ -38,6 +43,15 @@ class RunningState(IntEnum):
 class ControlledNode(Controlled, Protocol):
     """What the services act on: the ragdoll node."""
 
+    def load_world(self, name: str) -> Loaded:
+        """A scene, for use_world(); may run beside the ticks."""
+
+    def use_world(self, loaded: Loaded) -> SetParametersResult:
+        """Replace the present world."""
+
+    def unload_world(self) -> None:
+        """End the world."""
+
     @property
     def settings(self) -> NodeSettings:
         """Values of the parameters."""
@@ -56,18 +70,24 @@ class ControlledNode(Controlled, Protocol):
 class RunState:
     """State of a node's simulation; ``shut_down()`` ends the node."""
 
-    def __init__(self, controlled: ControlledNode, shut_down: Callable[[], None]) -> None:
-        self._controlled, self._shut_down = controlled, shut_down
+    def __init__(self, controlled: ControlledNode, loader: WorldLoader,
+                 shut_down: Callable[[], None]) -> None:
+        self._controlled, self._loader, self._shut_down = controlled, loader, shut_down
         self._stopped = self.run if controlled.settings.start_paused else None
 
     @property
-    def run(self) -> tuple[Simulation, int]:
-        """What a reset or a new scene changes."""
-        return self._controlled.simulation, self._controlled.simulation.reset_count
+    def run(self) -> tuple[Simulation, int, bool]:
+        """What a reset, a new scene or its end changes."""
+        controlled = self._controlled
+        return (controlled.simulation, controlled.simulation.reset_count, controlled.has_world)
 
     @property
     def state(self) -> RunningState:
         """The state now."""
+        if self._loader.is_loading:
+            return RunningState.LOADING_WORLD
+        if not self._controlled.has_world:
+            return RunningState.NO_WORLD
         if not self._controlled.paused:
             return RunningState.PLAYING
         if self._stopped == self.run and self._controlled.simulation.time == 0:
@@ -78,6 +98,12 @@ class RunState:
         """Change the state. Raises Refusal."""
         if target == self.state:
             raise Refusal(ALREADY_IN_TARGET_STATE, f'already {RunningState(target).name.lower()}')
+        if target in (RunningState.STOPPED, RunningState.QUITTING):
+            self._loader.cancel(f'the state {target} ({RunningState(target).name.lower()}) was set')
+        if target in (RunningState.STOPPED, RunningState.PLAYING, RunningState.PAUSED) and (
+                self.state in (RunningState.NO_WORLD, RunningState.LOADING_WORLD)):
+            raise Refusal(INCORRECT_TRANSITION, 'a world is being loaded' if (
+                self._loader.is_loading) else NO_WORLD)
         if target == RunningState.PLAYING:
             self._controlled.pause(False)
         elif target == RunningState.PAUSED:
@@ -85,9 +111,10 @@ class RunState:
             if not self._controlled.paused:
                 self._controlled.pause(True)
         elif target in (RunningState.STOPPED, RunningState.QUITTING):
-            self.stop()
-            self._controlled.reset()
-            self._stopped = self.run
+            if self._controlled.has_world:
+                self.stop()
+                self._controlled.reset()
+                self._stopped = self.run
             if target == RunningState.QUITTING:
                 self._shut_down()
         else:

@@ -12,8 +12,10 @@ from rclpy.clock import Clock
 from rclpy.node import Node
 
 from ...model.errors import RagdollError
-from .codes import Code
+from ..inputs.no_world import NO_WORLD
+from .codes import Code, Refusal
 from .entity_services import EntityServices
+from .resources.world_loader import WorldLoader
 from .run_state import ControlledNode, RunState
 from .simulation_services import SimulationServices
 from .spawning import SpawnServices
@@ -31,6 +33,12 @@ QUIT_DELAY = 0.2
 """s from the request to quit to the end of the node: the response is sent before."""
 
 
+WITHOUT_WORLD = {'GetSimulatorFeatures', 'GetSimulationState', 'SetSimulationState',
+                 'GetSpawnables', 'GetAvailableWorlds', 'LoadWorld', 'UnloadWorld',
+                 'GetCurrentWorld'}
+"""Services that answer while no world is loaded; all others are refused."""
+
+
 class SimulationInterfaces:
     """The servers on ``node``; ``controlled`` is the same node. ``after``: see EntityServices."""
 
@@ -43,12 +51,13 @@ class SimulationInterfaces:
         if srv is None:
             self.status = f'not served, as simulation_interfaces is not installed: {MISSING}'
             return
-        run_state = RunState(controlled, self._shut_down)
+        self._loader = WorldLoader(node, steady, controlled.load_world)
+        run_state = RunState(controlled, self._loader, self._shut_down)
         entities = EntityServices(controlled, msg, after)
         spawning = SpawnServices(controlled, msg, lambda: entities.entities)
         simulation = SimulationServices(
             controlled, run_state, Stepper(node, steady, controlled, run_state), msg, action,
-            node.set_parameters_atomically, spawning)
+            self._loader, spawning)
         # In a group of their own, as StepSimulation waits: others are served meanwhile.
         self._group = ReentrantCallbackGroup()
         served = {name: handler for name, handler in {
@@ -64,7 +73,9 @@ class SimulationInterfaces:
         self.status = f'{len(served)} services, 1 action'
 
     def destroy(self) -> None:
-        """Destroy the action's server, which the node does not."""
+        """Destroy the action's server, which the node does not, and end what is under way."""
+        if srv is not None:
+            self._loader.cancel('the node ends')
         while self.actions:
             self.actions.pop().destroy()
 
@@ -75,6 +86,8 @@ class SimulationInterfaces:
         async def serve(request: Any, response: Any) -> Any:
             refused = None
             try:
+                if name not in WITHOUT_WORLD and not self._controlled.has_world:
+                    raise Refusal(Code.INCORRECT_STATE, NO_WORLD)
                 waiting = handler(request, response)
                 if inspect.isawaitable(waiting):
                     await waiting

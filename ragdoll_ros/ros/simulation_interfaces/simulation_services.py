@@ -1,17 +1,25 @@
 """Services on the simulation as a whole: features, state, reset, steps, worlds."""
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from rclpy.action import CancelResponse
-from rclpy.parameter import Parameter
 
+from ...model.errors import RagdollError
 from ...physics.engine.capabilities import Capability
+from ..inputs.no_world import NO_WORLD
 from .codes import Code, Feature, Refusal
 from .entity_services import EntityServices
 from .resources.dolls import SPAWN_FORMATS
-from .resources.worlds import RESOURCE_PARSE_ERROR, World, available, scene_of
+from .resources.world_loader import Loaded, WorldLoader
+from .resources.worlds import (
+    NO_WORLD_LOADED,
+    RESOURCE_PARSE_ERROR,
+    World,
+    available,
+    scene_of,
+)
 from .run_state import ALL, SPAWNED, STATE, TIME, ControlledNode, RunState, checked_scope
 from .spawning import SpawnServices
 from .stepping import Stepper
@@ -28,7 +36,6 @@ class SimulationServices:
     """Handlers, each ``(request, response)``, which raise Refusal.
 
     ``messages``, ``actions``: the modules simulation_interfaces.msg and .action.
-    ``set_parameters``: the node's set_parameters_atomically.
     """
 
     FEATURES = {
@@ -40,24 +47,26 @@ class SimulationServices:
         'StepSimulation': (Feature.STEP_SIMULATION_SINGLE, Feature.STEP_SIMULATION_MULTIPLE),
         'GetAvailableWorlds': (Feature.AVAILABLE_WORLDS,),
         'LoadWorld': (Feature.WORLD_LOADING,),
+        'UnloadWorld': (Feature.WORLD_UNLOADING,),
         'GetCurrentWorld': (Feature.WORLD_INFO_GETTING,)}
     """What each service makes possible."""
 
     ACTION_FEATURES = (Feature.STEP_SIMULATION_ACTION,)
 
     def __init__(self, controlled: ControlledNode, run_state: RunState, stepper: Stepper,
-                 messages: Any, actions: Any, set_parameters: Callable,
+                 messages: Any, actions: Any, loader: WorldLoader,
                  spawning: SpawnServices) -> None:
         self._controlled, self._run_state, self._stepper = controlled, run_state, stepper
         self._messages, self._actions = messages, actions
-        self._set_parameters, self._spawning = set_parameters, spawning
+        self._loader, self._spawning = loader, spawning
         self.served: tuple[str, ...] = ()
         """Names of the services that are served."""
         self.handlers = {
             'GetSimulatorFeatures': self._get_features, 'GetSimulationState': self._get_state,
             'SetSimulationState': self._set_state, 'ResetSimulation': self._reset,
             'StepSimulation': self._step, 'GetAvailableWorlds': self._get_available_worlds,
-            'LoadWorld': self._load_world, 'GetCurrentWorld': self._get_current_world}
+            'LoadWorld': self._load_world, 'UnloadWorld': self._unload_world,
+            'GetCurrentWorld': self._get_current_world}
 
     async def simulate_steps(self, goal: Any) -> Any:
         """Execute the action's goal: feedback after each step; aborted or cancelled as refused."""
@@ -96,11 +105,12 @@ class SimulationServices:
     def _set_state(self, request: Any, _: Any) -> None:
         self._run_state.set(request.state.state)
 
-    def _reset(self, request: Any, _: Any) -> None:
+    async def _reset(self, request: Any, _: Any) -> None:
         """All is the world as it was loaded; other scopes keep what was deleted away."""
         scope, spawning = checked_scope(request.scope), self._spawning
         if scope == ALL and spawning.has_changed:
-            self._run_state.reset(lambda: self._set_scene(self._controlled.settings.scene))
+            loaded = await self._loaded(self._controlled.settings.scene)
+            self._run_state.reset(lambda: self._use(loaded))
             return
         if scope & SPAWNED:
             spawning.remove_spawned()
@@ -117,18 +127,39 @@ class SimulationServices:
         response.worlds = [self._fill(self._messages.WorldResource(), world) for world in worlds]
         response.result.error_message = message
 
-    def _load_world(self, request: Any, response: Any) -> None:
-        """Version 2 has a Resource, version 1 its fields."""
+    async def _load_world(self, request: Any, response: Any) -> None:
+        """Version 2 has a Resource, version 1 its fields. The present world goes on until the new
+        one is there.
+        """
         resource = getattr(request, 'world_resource', request)
-        self._set_scene(scene_of(resource.uri, resource.resource_string))
+        self._use(await self._loaded(scene_of(resource.uri, resource.resource_string)))
         self._run_state.stop()
         self._fill(response.world, self._world())
 
+    def _unload_world(self, _: Any, __: Any) -> None:
+        cancelled = self._loader.cancel('the world is to be unloaded')
+        if self._controlled.has_world:
+            self._controlled.unload_world()
+        elif not cancelled:
+            raise Refusal(NO_WORLD_LOADED, NO_WORLD)
+
     def _get_current_world(self, _: Any, response: Any) -> None:
+        if not self._controlled.has_world:
+            raise Refusal(NO_WORLD_LOADED, NO_WORLD)
         self._fill(response.world, self._world())
 
-    def _set_scene(self, name: str) -> None:
-        done = self._set_parameters([Parameter('scene', value=name)])
+    async def _loaded(self, name: str) -> Loaded:
+        """A world, loaded while all is served. Raises Refusal."""
+        try:
+            return await self._loader.load(name)
+        except Refusal:
+            raise
+        except RagdollError as error:
+            raise Refusal(RESOURCE_PARSE_ERROR, error) from None
+
+    def _use(self, loaded: Loaded) -> None:
+        """Replace the present world. Raises Refusal."""
+        done = self._controlled.use_world(loaded)
         if not done.successful:
             raise Refusal(RESOURCE_PARSE_ERROR, done.reason)
 

@@ -9,6 +9,7 @@ from rclpy.clock import Clock
 from rclpy.node import Node
 from rclpy.task import Future
 
+from ..inputs.no_world import NO_WORLD
 from ..ticker import MAX_CALLBACK_TIME
 from .codes import Code, Refusal
 from .run_state import ControlledNode, RunState
@@ -43,6 +44,8 @@ class Stepper:
         ``progress(made, left)`` is called after each step. Then each step has a callback of its
         own: clients take one message of feedback at a time, and none after the result.
         """
+        if not self._controlled.has_world:
+            raise Refusal(Code.INCORRECT_STATE, NO_WORLD)
         if not self._controlled.paused:
             raise Refusal(Code.OPERATION_FAILED, 'not paused: set the state 2 (paused) first')
         if self._order is not None:
@@ -76,5 +79,5 @@ class Stepper:
         if order.is_cancelled():
             return 'cancelled'
         if order.run != self._run_state.run:
-            return 'reset, or another scene,'
+            return 'reset, or another scene or none,'
         return None if self._controlled.paused else 'resumed'

@@ -44,7 +44,7 @@ def row(node: Node, scene: Scene, accuracy: str, ticks_before: int) -> dict[str,
     for _ in range(ticks_before):
         simulation.advance()
     outputs = Outputs(node)
-    outputs.set_scene(scene, 'world', 'none', outputs.prepare(scene, 'world', 'none'))
+    outputs.set_scene(scene, 'world', 'none')
     message = to_pose_array('world', 0, poses_of(simulation.state))
     publisher = node.create_publisher(PoseArray, '~/baseline', 10)
     baseline = BulletEngine(scene, BASELINE)

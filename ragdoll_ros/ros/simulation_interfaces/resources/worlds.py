@@ -15,6 +15,9 @@ from ..codes import Code, Refusal
 UNSUPPORTED_FORMAT, NO_RESOURCE, RESOURCE_PARSE_ERROR = 101, 102, 103
 """Results of LoadWorld."""
 
+NO_WORLD_LOADED = 101
+"""Result of UnloadWorld and GetCurrentWorld."""
+
 FORMATS = ('.yaml', '.yml')
 """Ends of the names of scenes' files."""
 

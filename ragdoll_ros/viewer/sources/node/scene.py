@@ -13,6 +13,7 @@ from ....fit.robots.robot import doll_from_urdf
 from ....model import errors
 from ....model.ragdoll import WORLD
 from ....model.scene import Ground, Placement, Scene
+from ....ros.inputs.no_world import NO_WORLD
 from ....ros.messages.measures import checksum
 from ....ros.parameters.node_settings import BONE_NAMES, SPECS, NodeSettings
 from .services import NodeServices
@@ -89,6 +90,9 @@ class NodeScene:
         if self._description is None or names is None or None in values.values():
             return
         self.settings = NodeSettings(**values)
+        if not self._description:
+            self.problem = NO_WORLD
+            return
         try:
             scene, self.note = scene_of_node(self.settings.scene, names, self._description,
                                              self.settings.frame_id)
