@@ -195,7 +195,7 @@ class InteractiveMarkerServer:
                      response: GetInteractiveMarkers.Response) -> GetInteractiveMarkers.Response:
         response.sequence_number = self._sequence
         if self._markers is not None:
-            response.markers = self._markers.at(self._simulation.state, self._markers.names)
+            response.markers = self._markers.at(self._simulation.state)
         return response
 
 

@@ -44,14 +44,14 @@ class InteractiveMarkers:
         self.names = frozenset(scene.bone_names)
         self._template: SerializedTemplate | None = None
 
-    def at(self, state: State, names: Collection[str]) -> list[InteractiveMarker]:
-        """A marker at the pose of each bone of these names; markers of equal bones share their
-        controls.
+    def at(self, state: State, names: Collection[str] | None = None) -> list[InteractiveMarker]:
+        """A marker at the pose of each bone, or of those of these names; markers of equal bones
+        share their controls.
         """
         models, markers = {}, []
         for name, bone, row in zip(self._scene.bone_names, self._scene.bones,
                                    poses_of(state).tolist(), strict=True):
-            if name not in names:
+            if names is not None and name not in names:
                 continue
             if id(bone) not in models:
                 models[id(bone)] = _marker(bone, self._header)
