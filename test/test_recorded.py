@@ -11,11 +11,10 @@ import pytest
 from digests import disturb
 
 from ragdoll_ros.files.doll import load_doll
-from ragdoll_ros.files.run_scene import doll_text, read_run_scene, run_scene_text, versions
+from ragdoll_ros.files.run_scene import SceneTexts, read_run_scene, run_scene_text, versions
 from ragdoll_ros.files.scene import load_scene, scene_text
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.drive import Drive
-from ragdoll_ros.model.per_doll import PerDoll
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
@@ -161,15 +160,15 @@ def test_a_scene_is_read_again_as_it_was(name):
 
 def test_texts_of_dolls_are_kept_and_make_the_same_text():
     """As dolls come and go, shared in any order: that of the writer of files, to the letter."""
-    texts, each = PerDoll(doll_text), [load_doll(name) for name in ('man', 'doll', 'woman')]
+    texts, each = SceneTexts(), [load_doll(name) for name in ('man', 'doll', 'woman')]
     for order in ([0], [0, 1], [0, 1, 1, 2, 0, 2, 2], [1, 2, 1], [2]):
         scene = Scene('one', tuple(Placement(each[k], f'doll {n}') for n, k in enumerate(order)))
-        texts.keep(placement.doll for placement in scene.dolls)
+        texts.keep(scene)
         assert run_scene_text(scene, texts) == scene_text(
             scene, Path('/'), f'versions: {versions()}')
     zeros = [Ragdoll('a', (Bone('b', Sphere(1.0), 1.0, (x, 0, 0)),)) for x in (0.0, -0.0)]
     assert zeros[0] == zeros[1]
-    assert [('-0.0' in texts[doll]) for doll in zeros] == [False, True]
+    assert [('-0.0' in texts.dolls[doll]) for doll in zeros] == [False, True]
 
 
 def test_a_text_without_versions_is_no_scene_of_a_run():

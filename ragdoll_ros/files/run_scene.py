@@ -1,6 +1,7 @@
 """The scene of a run as YAML, with the versions of the libraries that computed it: ~/scene. A doll
 that comes later in the same form.
 """
+import dataclasses
 import functools
 import hashlib
 import platform
@@ -21,8 +22,8 @@ LIBRARIES = ('ragdoll_ros', 'numpy', 'numba', 'pybullet', 'mujoco')
 
 _VERSIONS = re.compile(r'^# versions: (.*)$', re.MULTILINE)
 
-_DOLL = re.compile(r'^- doll: doll_(\d+)$', re.MULTILINE)
-"""What stands for a doll in the text of a scene, until its own text is put in."""
+DOLLS = 'dolls_of_the_run'
+"""What stands for the dolls in the text of a scene, until their own texts are put in."""
 
 
 @functools.cache
@@ -43,33 +44,50 @@ def doll_text(doll: Ragdoll) -> str:
     return text.split('\n', 2)[2].rstrip('\n')
 
 
-def run_scene_text(scene: Scene, texts: PerDoll[str] | None = None) -> str:
-    """YAML of a scene with its dolls; read_run_scene reads an equal one.
-
-    ``texts``: of doll_text, kept from scene to scene: a doll is most of its scene's text. The
-    result is that of scene_text(), which writes a doll that several placements share once.
+class SceneTexts:
+    """Texts of dolls and of how they are placed, kept from scene to scene: they are most of a
+    scene's text.
     """
-    texts = texts or PerDoll(doll_text)
-    dolls = list({id(placement.doll): placement.doll for placement in scene.dolls}.values())
-    place = {id(doll): index for index, doll in enumerate(dolls)}
-    text = yaml_text.to_text(scene_data(scene, data_of=lambda doll: f'doll_{place[id(doll)]}'),
-                             'scene', f'versions: {versions()}')
-    found = list(map(int, _DOLL.findall(text)))
+
+    def __init__(self) -> None:
+        self.dolls, self.entries = PerDoll(doll_text), PerDoll(entry_text)
+
+    def keep(self, scene: Scene) -> None:
+        """Forget what is not of this scene."""
+        self.dolls.keep(placement.doll for placement in scene.dolls)
+        self.entries.keep(scene.dolls)
+
+
+def entry_text(placement: Placement) -> str:
+    """YAML of a placement as it stands in the list of a scene's dolls, but for the doll."""
+    alone = scene_data(Scene(placement.name, (placement,)), data_of=lambda doll: None)
+    return yaml_text.dump({'dolls': alone['dolls']}).split('\n', 2)[2]
+
+
+def run_scene_text(scene: Scene, texts: SceneTexts | None = None) -> str:
+    """YAML of a scene with its dolls; read_run_scene reads an equal one. It is that of
+    scene_text(), which writes a doll that several placements share once.
+    """
+    texts = texts or SceneTexts()
+    data = scene_data(dataclasses.replace(scene, dolls=scene.dolls[:1]), data_of=lambda doll: None)
+    text = yaml_text.to_text({**data, 'dolls': DOLLS}, 'scene', f'versions: {versions()}')
+    seen: set[int] = set()
     anchors: dict[int, str] = {}
-    for number, index in enumerate(found):
-        if index in found[:number] and index not in anchors:
-            anchors[index] = f'id{len(anchors) + 1:03d}'
-    written = set()
-
-    def own(match: re.Match) -> str:
-        index = int(match[1])
-        if index in written:
-            return f'- doll: *{anchors[index]}'
-        written.add(index)
-        anchor = f' &{anchors[index]}' if index in anchors else ''
-        return f'- doll:{anchor}\n{texts[dolls[index]]}'
-
-    return _DOLL.sub(own, text)
+    for key in (id(placement.doll) for placement in scene.dolls):
+        if key in seen and key not in anchors:
+            anchors[key] = f'id{len(anchors) + 1:03d}'
+        seen.add(key)
+    entries = ['dolls:\n']
+    for placement in scene.dolls:
+        key = id(placement.doll)
+        if key in seen:
+            seen.remove(key)
+            anchor = f' &{anchors[key]}' if key in anchors else ''
+            entries.append(f'- doll:{anchor}\n{texts.dolls[placement.doll]}\n')
+        else:
+            entries.append(f'- doll: *{anchors[key]}\n')
+        entries.append(texts.entries[placement])
+    return text.replace(f'dolls: {DOLLS}\n', ''.join(entries), 1)
 
 
 def read_run_scene(text: str) -> tuple[Scene, str]:
@@ -80,7 +98,7 @@ def read_run_scene(text: str) -> tuple[Scene, str]:
     return scene_from_data(yaml_text.parse(text.encode()), Path('/scene')), found[1]
 
 
-def placement_text(placement: Placement, texts: PerDoll[str] | None = None) -> str:
+def placement_text(placement: Placement, texts: SceneTexts | None = None) -> str:
     """YAML of a placed doll, as a scene of it alone; read_placement reads an equal one.
     ``texts``: see run_scene_text().
     """

@@ -25,8 +25,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from ..files.run_scene import doll_text, placement_text, run_scene_text, scene_digest
-from ..model.per_doll import PerDoll
+from ..files.run_scene import SceneTexts, placement_text, run_scene_text, scene_digest
 from ..model.scene import Scene
 from ..physics.logged_simulation import LoggedSimulation, state_digest
 from .latched_topic import LATCHED
@@ -53,12 +52,12 @@ class EventLog:
         self._scenes = node.create_publisher(String, '~/scene', LATCHED)
         self._scene: Scene | None = None
         self._simulation: LoggedSimulation | None = None
-        self._texts = PerDoll(doll_text)
+        self._texts = SceneTexts()
         self._number = self._tick = 0
 
     def prepare(self, scene: Scene) -> RunScene:
         """What is published of a scene; this may run beside the ticks."""
-        self._texts.keep(placement.doll for placement in scene.dolls)
+        self._texts.keep(scene)
         text = run_scene_text(scene, self._texts)
         return RunScene(text, scene_digest(text))
 
