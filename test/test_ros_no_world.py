@@ -25,7 +25,7 @@ from visualization_msgs.msg import (
 )
 from visualization_msgs.srv import GetInteractiveMarkers
 
-from ragdoll_ros.model.errors import RagdollError, Unreadable
+from ragdoll_ros.model.errors import Closed, RagdollError, Unreadable
 from ragdoll_ros.replay.command import main
 from ragdoll_ros.ros.event_log import HASH_INTERVAL
 from ragdoll_ros.ros.latched_topic import LATCHED_HISTORY
@@ -140,6 +140,26 @@ def test_listeners_hear_that_there_is_none_and_then_the_next_one(make_node, peer
         ('/ragdoll/scene', scenes), ('/ragdoll/events', events)) for _, each in messages])
     assert main([str(bag)]) == 0
     assert re.search(r'(\d+) of \1 hashes equal', capsys.readouterr().out)
+
+
+def test_a_loaded_world_fits_the_parameters_of_the_moment_it_comes(make_node):
+    """They may change while it loads: then it is made anew, or refused."""
+    node = make_node(scene='drop', start_paused=True)
+    loaded = node.load_world('crowd')
+    assert node.use_world(loaded).successful and node.simulation is loaded.simulation
+    loaded = node.load_world('flight')
+    node.set_parameters([Parameter('rate', value=50.0)])
+    assert node.use_world(loaded).successful and node.simulation is not loaded.simulation
+    assert node.simulation.step == 1 / 50 and node.simulation.scene.name == 'flight'
+    loaded = node.load_world('crowd')
+    node.set_parameters([Parameter('imus', value=['head 0 0 0.1'])])
+    done = node.use_world(loaded)
+    assert not done.successful and 'head' in done.reason
+    assert node.simulation.scene.name == 'flight'
+    with pytest.raises(Closed):
+        loaded.simulation.advance()
+    with pytest.raises(RagdollError, match='head'):
+        node.load_world('crowd')
 
 
 @pytest.fixture

@@ -213,7 +213,11 @@ class RagdollNode(Node):
     def use_world(self, loaded: LoadedWorld) -> SetParametersResult:
         """Set the parameter `scene` to what has been loaded: it replaces the present one."""
         self._loaded = loaded
-        return self.set_parameters_atomically([Parameter('scene', value=loaded.settings.scene)])
+        done = self.set_parameters_atomically([Parameter('scene', value=loaded.settings.scene)])
+        if self._loaded is not None:  # refused before it was looked at
+            loaded.simulation.close()
+            self._loaded = None
+        return done
 
     def unload_world(self) -> None:
         """End the world: nothing is simulated or published until another one is loaded."""
