@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from .model.errors import RagdollError as RagdollError
     from .model.follow import Follow as Follow
     from .model.mesh import HeightField as HeightField
+    from .model.mesh import Hull as Hull
     from .model.mesh import Mesh as Mesh
+    from .model.plane import Plane as Plane
     from .model.push import Push as Push
     from .model.ragdoll import Bone as Bone
     from .model.ragdoll import Joint as Joint
@@ -44,9 +46,10 @@ if TYPE_CHECKING:
 _MODULES = {
     'Bone': 'model.ragdoll', 'Box': 'model.shapes', 'Capsule': 'model.shapes',
     'Compound': 'model.compound', 'Cylinder': 'model.shapes', 'Drive': 'model.drive',
-    'Follow': 'model.follow', 'Ground': 'model.scene',
-    'HeightField': 'model.mesh', 'Joint': 'model.ragdoll', 'Mesh': 'model.mesh',
-    'Part': 'model.shapes', 'Placement': 'model.scene', 'Push': 'model.push',
+    'Follow': 'model.follow', 'Ground': 'model.scene', 'HeightField': 'model.mesh',
+    'Hull': 'model.mesh', 'Joint': 'model.ragdoll', 'Mesh': 'model.mesh',
+    'Part': 'model.shapes', 'Placement': 'model.scene', 'Plane': 'model.plane',
+    'Push': 'model.push',
     'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
     'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pytest
 
-from ragdoll_ros import Box, Compound, Simulation, load_scene, save_scene
+from ragdoll_ros import Box, Compound, Plane, Simulation, load_scene, save_scene
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import ModelErrors
 from ragdoll_ros.model.pose import Pose
@@ -192,7 +192,7 @@ def test_meshes_are_refused_or_become_boxes(tmp_path):
     package.mkdir()
     said = refusal(tmp_path, '{name: a, urdf: r.urdf}', r_urdf=urdf)
     assert ("bodies[0].urdf.(r.urdf).link shell.mesh: WrongForm: 'package://robot/shell.stl'; "
-            'expected a box, sphere, cylinder or capsule; `meshes: box`') in said
+            'expected a box, sphere, cylinder or capsule; or `meshes: exact`') in said
     said = refusal(tmp_path, '{name: a, urdf: r.urdf, meshes: box}')
     assert "link shell.mesh: Unreadable: 'package://robot/shell.stl'; expected a file" in said
     pytest.importorskip('trimesh')
@@ -205,6 +205,45 @@ def test_meshes_are_refused_or_become_boxes(tmp_path):
         # The file has floats.
         assert sorted(body.shape.size) == pytest.approx([0.2, 0.2, 0.4], rel=1e-6)
         assert body.position == pytest.approx((0.5, 0, 1), abs=1e-6)
+
+
+def test_meshes_become_hulls_or_their_triangles(tmp_path):
+    """An L of STL in a link with a box: the box is one body, the mesh another."""
+    trimesh = pytest.importorskip('trimesh')
+    pytest.importorskip('scipy')
+    parts = [trimesh.creation.box((2, 1, 1)), trimesh.creation.box((1, 1, 2))]
+    parts[0].apply_translation((0.5, 0, 0))
+    parts[1].apply_translation((0, 0, 1.5))
+    shape = trimesh.util.concatenate(parts)
+    shape.export(tmp_path / 'shell.stl')
+    urdf = ('<robot name="r"><link name="shell"><collision><origin xyz="0 0 1" rpy="0 0 0.5"/>'
+            '<geometry><mesh filename="shell.stl" scale="1 1 2"/></geometry></collision>'
+            '<collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>')
+    exact, hull = (scene(tmp_path, f'{{name: a, urdf: r.urdf, meshes: {how}, position: [3, 0, 0]}}',
+                         r_urdf=urdf) for how in ('exact', 'hull'))
+    for made, kind, volume in ((exact, 'mesh', 8.0), (hull, 'hull', 2 * shape.convex_hull.volume)):
+        box, body = made.bodies
+        assert (box.name, box.shape) == ('a_shell', Box((1, 1, 1)))
+        assert (body.name, body.shape.kind) == ('a_shell_2', kind)
+        assert body.position == pytest.approx((3, 0, 1))
+        assert rotation.angle_between(body.orientation, rotation.from_rpy(0, 0, 0.5)) < 1e-9
+        assert trimesh.Trimesh(*body.shape.mesh()).volume == pytest.approx(volume)
+        save_scene(made, tmp_path / 'copy.yaml')
+        assert load_scene(str(tmp_path / 'copy.yaml')).bodies == made.bodies
+
+
+@pytest.mark.parametrize(('key', 'text'), [
+    ('urdf', '<robot name="r"><link name="a"><collision><origin xyz="1 2 3" rpy="0 0.3 0"/>'
+     '<geometry><plane normal="0 0 2"/></geometry></collision></link></robot>'),
+    ('sdf', '<sdf version="1.8"><model name="r"><link name="a"><collision name="c">'
+     f'<pose>1 2 3 0 0 0</pose><geometry><plane><normal>{math.sin(0.3)} 0 {math.cos(0.3)}</normal>'
+     '<size>1 1</size></plane></geometry></collision></link></model></sdf>')])
+def test_planes_are_read(tmp_path, key, text):
+    made = scene(tmp_path, f'{{name: w, {key}: r.{key}, friction: 0.4}}', **{f'r_{key}': text})
+    body, = made.bodies
+    assert (body.name, body.shape, body.friction) == ('w_a', Plane(), 0.4)
+    assert body.position == pytest.approx((1, 2, 3))
+    assert body.normal == pytest.approx((math.sin(0.3), 0, math.cos(0.3)))
 
 
 LINK = ('<robot name="r"><link name="a"><collision><geometry>{}</geometry></collision></link>'
@@ -246,8 +285,10 @@ POSE = '<pose relative_to="{}"/>'
      + POSE.format('f') + '</link>', 'expected no frame relative to itself'),
     ('', 'expected a <model> that has a <link>'),
     ('<link name="a"><pose>1 2</pose></link>', "a.pose: WrongForm: '1 2'; expected 6 finite"),
-    ('<link name="a"><collision name="c"><geometry><plane/></geometry></collision></link>',
-     "link a: WrongForm: 'a <plane>'; expected the scene's `ground`")])
+    ('<link name="a"><collision name="c"><geometry><plane><normal>0 0 0</normal></plane></geometry>'
+     '</collision></link>', 'link a.plane.normal: NotUnit: [0.0, 0.0, 0.0]; expected a direction'),
+    ('<link name="a"><collision name="c"><geometry><heightmap/></geometry></collision></link>',
+     "link a: WrongForm: 'a <heightmap>'; expected a box")])
 def test_what_is_wrong_in_an_sdf_is_named(tmp_path, body, said):
     sdf = f'<sdf version="1.8"><model name="m">{body}</model></sdf>'
     assert said in refusal(tmp_path, '{name: a, sdf: m.sdf}', m_sdf=sdf)

@@ -11,6 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
+from ragdoll_ros.model.plane import Plane
 from ragdoll_ros.model.push import ARROW_LENGTH, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Material, Placement, Scene
@@ -60,6 +61,21 @@ def test_markers_show_static_bodies_where_they_stand(lone):
     assert (place.x, place.y, place.z) == body.position
     assert (turn.x, turn.y, turn.z, turn.w) == body.orientation
     assert (marker.type, size.x, size.y, size.z) == (Marker.CUBE, 0.1, 2.0, 3.0)
+
+
+def test_markers_show_a_plane_as_a_square_whose_face_is_up(lone):
+    body = StaticBody('slope', Plane(), (1.0, 2.0, 3.0), (0.0, 0.1, 0.0, 1.0))
+    sloping = dataclasses.replace(lone.scene, bodies=(body,))
+    array = heard(SceneMarkers(sloping, 'map').serialize(7, lone.state, ()))
+    marker, = [marker for marker in array.markers if marker.ns == 'bodies/slope']
+    assert marker.type == Marker.TRIANGLE_LIST
+    place, turn = marker.pose.position, marker.pose.orientation
+    assert (place.x, place.y, place.z) == body.position
+    corners = rotation.rotate((turn.x, turn.y, turn.z, turn.w), np.array(
+        [(point.x, point.y, point.z) for point in marker.points])).reshape(2, 3, 3)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    np.testing.assert_allclose(rotation.normalized(normals), [body.normal] * 2, atol=1e-12)
+    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(100.0 ** 2)
 
 
 def test_contact_wrenches_name_what_touches_and_bear_the_weight():

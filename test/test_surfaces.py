@@ -15,6 +15,7 @@ from ragdoll_ros import (
     Capsule,
     Cylinder,
     HeightField,
+    Hull,
     Mesh,
     Placement,
     RagdollError,
@@ -280,6 +281,71 @@ bodies:
     (tmp_path / 'other').mkdir()
     save_scene(world, tmp_path / 'other' / 'copy.yaml')
     assert load_scene(tmp_path / 'other' / 'copy.yaml') == world
+
+
+@pytest.mark.parametrize('kind', ['glb', 'gltf'])
+def test_gltf_is_turned_to_z_up(tmp_path, kind):
+    """A box of 1 x 2 x 3 along glTF's axes, moved by its node by 5 m up, glTF's y; as in RViz its z
+    is backwards then, our -y.
+    """
+    trimesh = pytest.importorskip('trimesh')
+    made = trimesh.Scene()
+    made.add_geometry(trimesh.creation.box((1, 2, 3)),
+                      transform=trimesh.transformations.translation_matrix((0, 5, 1)))
+    export = made.export(file_type=kind, **({'embed_buffers': True} if kind == 'gltf' else {}))
+    (tmp_path / f'box.{kind}').write_bytes(export['model.gltf'] if kind == 'gltf' else export)
+    (tmp_path / 'world.yaml').write_text(f"""dolls: [{{doll: doll, position: [0, 0, 9]}}]
+bodies: [{{name: box, shape: {{mesh: {{file: box.{kind}, scale: [1, 1, 2]}}}}}}]
+""")
+    body, = load_scene(tmp_path / 'world.yaml').bodies
+    vertices, _ = body.shape.mesh()
+    np.testing.assert_allclose(vertices.min(axis=0), (-0.5, -2.5, 8), atol=1e-6)
+    np.testing.assert_allclose(vertices.max(axis=0), (0.5, 0.5, 12), atol=1e-6)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_a_hull_is_the_box_around_its_points(tmp_path, accuracy):
+    """Of the corners of a box and of points within; a ball falls on it as on the box."""
+    pytest.importorskip('trimesh')
+    pytest.importorskip('scipy')
+    rng = np.random.default_rng(3)
+    points = np.concatenate([CUBE[0], rng.uniform(-0.45, 0.45, (20, 3))])
+    file = tmp_path / 'stone.yaml'
+    file.write_text(f"""dolls: [{{doll: doll}}]
+bodies:
+  - {{name: stone, shape: {{hull: {{vertices: {points.tolist()}}}}}, position: [0, 0, 0.5]}}
+""")
+    world = load_scene(file)
+    stone, = world.bodies
+    assert len(stone.shape.vertices) == 8
+    save_scene(world, tmp_path / 'again.yaml')
+    assert load_scene(tmp_path / 'again.yaml') == world
+    ball = loose(Sphere(0.1), position=(0.52, 0.11, 1.3))
+    law = {'restitution': 0.3, 'friction': 0.3}
+    on_hull, _ = states(scene(ball, [stone], **law), 0.8, accuracy)
+    box = StaticBody('box', Box((1, 1, 1)), position=(0, 0, 0.5))
+    on_box, _ = states(scene(ball, [box], **law), 0.8, accuracy)
+    np.testing.assert_allclose(on_hull[:, 0, :3], on_box[:, 0, :3],
+                               atol=1e-6 if accuracy == 'exact' else 1e-5)
+
+
+def test_a_hull_is_convex_and_closed():
+    vertices, faces = CUBE
+    for wrong, told in ((faces[:, ::-1], 'outside a face'), (faces[:-1], 'without a second')):
+        with pytest.raises(RagdollError, match=told):
+            Hull(vertices, wrong)
+
+
+@pytest.mark.parametrize('text, told', [
+    ('{hull: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]}}', 'around a volume'),
+    ('{hull: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]}}, mass: 3',
+     'a hull never moves')])
+def test_what_is_no_hull_is_refused(tmp_path, text, told):
+    pytest.importorskip('trimesh')
+    file = tmp_path / 'wrong.yaml'
+    file.write_text(f'dolls: [{{doll: doll}}]\nbodies: [{{name: stone, shape: {text}}}]\n')
+    with pytest.raises(RagdollError, match=told):
+        load_scene(file)
 
 
 def test_other_engines_refuse_surfaces():

@@ -18,12 +18,14 @@ from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.fit.skin import skin_of
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.coordinates import GeneralizedState
+from ragdoll_ros.model.plane import Plane
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene, above_ground
 from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
+from ragdoll_ros.model.static_body import StaticBody
 from ragdoll_ros.physics.engine.protocol import GROUND
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Rods
@@ -40,7 +42,7 @@ from ragdoll_ros.viewer.drawing.overlays import (
     force_arrows,
 )
 from ragdoll_ros.viewer.drawing.skin_meshes import SkinMeshes
-from ragdoll_ros.viewer.drawing.stage import CELL, FADE, grid_size
+from ragdoll_ros.viewer.drawing.stage import CELL, FADE, draw_static_bodies, grid_size
 from ragdoll_ros.viewer.pointer import nearest_bone, target_at_distance, to_bone_frame
 from ragdoll_ros.viewer.sources.source import Frame
 
@@ -389,6 +391,21 @@ def test_the_ground_is_below_all_dolls_seen_from_home(name):
     apart = 300 / np.tan(0.4) * eye[2] * cell / (reach / 2) ** 2
     assert apart > 1.5
     assert (cell, reach) == (CELL, FADE) or name != 'drop'
+
+
+def test_a_plane_is_drawn_from_above_alone():
+    """From below it would hide the whole scene, as in a corner of walls."""
+    import viser
+    slope = StaticBody('slope', Plane(), (1.0, 0.0, 0.5), (0.0, 0.1, 0.0, 1.0))
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    draw_static_bodies(server, dataclasses.replace(load_scene('drop'), bodies=(slope,)))
+    mesh = server.scene.get_handle_by_name('/scene/static/surface_0')
+    server.stop()
+    vertices, faces = mesh.vertices, mesh.faces
+    normal = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]],
+                      vertices[faces[:, 2]] - vertices[faces[:, 0]])
+    assert mesh.side == 'front' and not mesh.cast_shadow
+    assert (normal[:, 2] > 0).all() and not normal[:, :2].any() and not vertices[:, 2].any()
 
 
 def test_a_ball_at_each_joint_reaches_into_both_bones():

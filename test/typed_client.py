@@ -19,10 +19,12 @@ from ragdoll_ros import (
     Follow,
     Ground,
     HeightField,
+    Hull,
     Joint,
     Mesh,
     Part,
     Placement,
+    Plane,
     Push,
     Ragdoll,
     RagdollError,
@@ -96,10 +98,14 @@ def main(folder: Path) -> None:
                       (0.0, 9.0, 0.0))
     ramp = StaticBody('ramp', Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 1]], float),
                                    np.array([[0, 1, 2]])), (0.0, -9.0, 0.0))
+    stone = StaticBody('stone', Hull(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float),
+                                     np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])),
+                       (9.0, 0.0, 0.0))
+    slope = StaticBody('slope', Plane(), (0.0, 0.0, -1.0), (0.0, 0.1, 0.0, 1.0))
     scene = Scene('pair', (Placement(doll, position=(0.0, 0.0, 2.0)), Placement(stand),
                            Placement(person(1.75, 70.0, 'female'), position=(1.0, 0.0, 0.0))),
                   Ground(), bodies=(StaticBody('wall', Box((0.1, 2.0, 2.0)), (2.0, 0.0, 1.0)),
-                                    hill, ramp))
+                                    hill, ramp, stone, slope))
     save_scene(scene, folder / 'pair.yaml')
     state = fall(load_scene(str(folder / 'pair.yaml')), folder)
     rows: tuple[int, ...] = state.positions.shape

@@ -8,6 +8,7 @@ from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange, WrongForm
 from ..model.follow import Follow
 from ..model.mesh import Surface
+from ..model.plane import Plane
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.rotation import IDENTITY
@@ -74,7 +75,7 @@ def body_data(body: StaticBody) -> dict:
                 'friction': body.friction, 'rolling_friction': body.rolling_friction,
                 'restitution': body.restitution,
                 'color': None if body.color is None else list(body.color)}
-    shape = surface_data if isinstance(body.shape, Surface) else shape_data
+    shape = surface_data if isinstance(body.shape, Surface | Plane) else shape_data
     return {'name': body.name, **shape(body.shape), 'position': list(body.position),
             **{key: value for key, value in optional.items() if value is not None}}
 

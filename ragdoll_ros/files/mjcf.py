@@ -16,11 +16,15 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from ..model import rotation
+from ..model.plane import Plane
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Joint, joint_axes
 from ..model.scene import Placement, Scene, finite_friction
 from ..model.shapes import Shape
 from ..model.static_body import StaticBody
+
+UNLIMITED = (0.0, 0.0, 1.0)
+"""Size of a plane without an end; the last number is the spacing of what is drawn."""
 
 CONTACT_TIME = 0.02
 """s, time constant of a contact, MuJoCo's default; the engine sets one for its step."""
@@ -71,7 +75,7 @@ def damping_ratio(restitution: float) -> float:
 def _add_ground(world: ET.Element, scene: Scene) -> None:
     normal = np.array(scene.ground.normal)
     turn = rotation.shortest_arc(np.array((0.0, 0.0, 1.0)), normal)
-    ET.SubElement(world, 'geom', name='ground', type='plane', size='0 0 1', contype='1',
+    ET.SubElement(world, 'geom', name='ground', type='plane', size=_text(UNLIMITED), contype='1',
                   conaffinity='3', solmix='0', pos=_text(normal * scene.ground.offset),
                   quat=_quaternion(turn), **_material(scene, None))
 
@@ -80,10 +84,10 @@ def _add_bodies(world: ET.Element, scene: Scene) -> None:
     for body in scene.bodies:
         own = (body.friction, body.rolling_friction, body.restitution)
         is_special = own != (None, None, None)
-        for number, part in enumerate(body.parts, 1):
-            ET.SubElement(world, 'geom', name=f'bodies/{body.name}/{number}', type=part.kind,
-                          size=_text(_size(part.shape)), pos=_text(part.position),
-                          quat=_quaternion(part.orientation), contype='1', conaffinity='3',
+        for number, (kind, size, pose) in enumerate(static_geoms(body), 1):
+            ET.SubElement(world, 'geom', name=f'bodies/{body.name}/{number}', type=kind,
+                          size=_text(size), pos=_text(pose.position),
+                          quat=_quaternion(pose.orientation), contype='1', conaffinity='3',
                           priority='1' if is_special else '0',
                           **_material(scene, body if is_special else None))
 
@@ -137,6 +141,13 @@ def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
         ranged = {'range': _text(pair)} if pair else {}
         yield {'name': name, 'type': 'hinge', **place, **ranged,
                'axis': _text(rotation.rotate(back, axis))}
+
+
+def static_geoms(body: StaticBody) -> list[tuple[str, tuple[float, ...], Pose]]:
+    """Type, size and pose in the world of each geom of a static body, in MuJoCo's form."""
+    if isinstance(body.shape, Plane):
+        return [('plane', UNLIMITED, body.pose)]
+    return [(part.kind, _size(part.shape), part.pose) for part in body.parts]
 
 
 def _size(shape: Shape) -> tuple[float, ...]:

@@ -1,44 +1,55 @@
-"""Surfaces of static bodies: height fields from numbers, .npy and pictures; meshes from files."""
+"""Shapes that static bodies alone have: planes; height fields from numbers, .npy and pictures;
+meshes and their hulls.
+"""
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..model import errors
-from ..model.mesh import SURFACES, HeightField, Mesh, Surface
-from ..model.vectors import Vector, floats
+from ..model.mesh import SURFACES, HeightField, Hull, Mesh, Surface
+from ..model.plane import Plane
+from ..model.vectors import floats
 from .config import config_folder
-from .robots.mesh_file import find_file, read_mesh
+from .robots.mesh_file import UNSCALED, convex_hull, find_file, read_hull, read_surface
 
 MAX_BYTES = 64_000_000
 """Of a file of heights; a million cells of doubles have 8 MB."""
 
 PICTURES = ('.png', '.tif', '.tiff')
 
-UNSCALED = (1.0, 1.0, 1.0)
-
 
 def surface_kind(entry: dict) -> str | None:
-    """The kind of surface that is the shape of an entry of `bodies:`, if it is one."""
+    """The kind of the shape of an entry of `bodies:`, if static bodies alone have it."""
     shape = entry.get('shape')
-    return next((kind for kind in SURFACES if isinstance(shape, dict) and kind in shape), None)
+    return next((kind for kind in (*SURFACES, Plane.kind)
+                 if isinstance(shape, dict) and kind in shape), None)
 
 
-def build_surface(entry: dict, folder: Path) -> Surface:
-    """The surface of an entry; paths are relative to ``folder``. Raises ModelError."""
+def build_surface(entry: dict, folder: Path) -> Surface | Plane:
+    """The surface or plane of an entry; paths are relative to ``folder``. Raises ModelError."""
     kind = surface_kind(entry)
     assert kind
+    if kind == Plane.kind:
+        return Plane()
     data = entry['shape'][kind]
     try:
-        return _mesh(data, folder) if kind == 'mesh' else _height_field(data, folder)
+        if kind == HeightField.kind:
+            return _height_field(data, folder)
+        return _mesh(kind, data, folder)
     except errors.ModelError as error:
         raise error.at('shape' if error.path.startswith(kind) else f'shape.{kind}') from None
 
 
-def surface_data(surface: Surface) -> dict:
-    """A surface in the form of scene.schema.json: its file, or its numbers where it has none."""
-    if isinstance(surface, HeightField):
-        data: dict[str, Any] = {'size': list(surface.size)}
+def surface_data(surface: Surface | Plane) -> dict:
+    """A surface or plane in the form of scene.schema.json: its file, or where it has none
+    its numbers.
+    """
+    data: dict[str, Any] = {}
+    if isinstance(surface, Plane):
+        pass
+    elif isinstance(surface, HeightField):
+        data['size'] = list(surface.size)
         if surface.source:
             data |= {'heights': surface.source[0], 'scale': surface.source[1]}
         else:
@@ -61,26 +72,20 @@ def _height_field(data: dict, folder: Path) -> HeightField:
     return HeightField(scale * _read_heights(path), size, source=(str(path), float(scale)))
 
 
-def _mesh(data: dict, folder: Path) -> Mesh:
+def _mesh(kind: str, data: dict, folder: Path) -> Mesh:
+    """A mesh, or the hull of one."""
     if 'file' not in data:
         if 'scale' in data:
             raise errors.WrongForm('scale', data['scale'], 'a file: vertices are in m')
-        return Mesh(data['vertices'], data['faces'])
+        if kind == Mesh.kind:
+            return Mesh(data['vertices'], data['faces'])
+        return Hull(data['vertices'], data['faces']) if 'faces' in data else convex_hull(
+            np.array(data['vertices'], float))
     path, scale = _found('file', data['file'], folder), floats(data.get('scale', UNSCALED))
     try:
-        corners = read_mesh(path, scale)
+        return (read_hull if kind == Hull.kind else read_surface)(path, scale)
     except errors.ModelError as error:
         raise type(error)(f'file.({path.name})', error.value, error.expected) from None
-    vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    faces = faces.reshape(-1, 3)
-    if np.prod(scale) < 0:
-        faces = faces[:, ::-1]  # a mirrored mesh is inside out
-    return Mesh(vertices, faces, source=(str(path), _three(scale)))
-
-
-def _three(values: tuple[float, ...]) -> Vector:
-    x, y, z = values
-    return x, y, z
 
 
 def _found(key: str, name: str, folder: Path) -> Path:

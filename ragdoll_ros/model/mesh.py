@@ -17,6 +17,9 @@ MAX_TRIANGLES = 1_000_000
 THINNEST = 1e-6
 """Height of a triangle over its longest edge from which on it has a normal."""
 
+CONVEX = 1e-6
+"""How far a vertex of a hull may be outside a face, over the hull's size: rounding of its file."""
+
 OPEN = 1e9
 """`Triangles.edges` where there is no next triangle."""
 
@@ -111,6 +114,36 @@ class Mesh(Surface):
 
 
 @dataclass(frozen=True, eq=False)
+class Hull(Mesh):
+    """A convex polyhedron. Raises WrongForm where a vertex is outside a face.
+
+    Args:
+        vertices, faces, source: as of a Mesh; the surface is closed.
+
+    Example:
+        >>> tetrahedron = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        >>> Hull(tetrahedron, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).kind
+        'hull'
+    """
+
+    kind: ClassVar[str] = 'hull'
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        triangles, size = self.triangles, float(np.ptp(self.vertices, axis=0).max())
+        offsets = np.einsum('ti,ti->t', triangles.normals, triangles.corners[:, 0])
+        # In parts: of many vertices and faces all products do not fit into memory.
+        for normals, offset in zip(np.array_split(triangles.normals, 1 + len(offsets) // 1000),
+                                   np.array_split(offsets, 1 + len(offsets) // 1000), strict=True):
+            outside = float((self.vertices @ normals.T - offset).max(initial=0.0))
+            if outside > CONVEX * size:
+                raise errors.WrongForm('hull', f'a vertex {outside:.3g} m outside a face',
+                                       'a convex surface, its faces anticlockwise from outside')
+        if (triangles.edges == OPEN).any():
+            raise errors.WrongForm('hull', 'an edge without a second face', 'a closed surface')
+
+
+@dataclass(frozen=True, eq=False)
 class HeightField(Surface):
     """Heights over a rectangular grid, its middle at the origin; each cell is two triangles.
 
@@ -158,7 +191,7 @@ class HeightField(Surface):
         return _digest(self.heights, self.size, self.source)
 
 
-SURFACES: dict[str, type] = {surface.kind: surface for surface in (HeightField, Mesh)}
+SURFACES: dict[str, type] = {surface.kind: surface for surface in (HeightField, Mesh, Hull)}
 
 
 def connected(vertices: np.ndarray, faces: np.ndarray) -> Triangles:

@@ -3,15 +3,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import errors
+from . import errors, rotation
 from .compound import Compound
 from .errors import set_fields
 from .mesh import Surface
+from .plane import Plane
 from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Part, Shape, Solid
 from .surface import check_surface
-from .vectors import Quaternion, Vector, finite_floats, unit_vector
+from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
 
 DEFAULT_COLOR = (0.76, 0.78, 0.81, 1.0)
 """Red, green, blue and opacity of bodies that have no colour: between the ground's and a doll's."""
@@ -23,7 +24,8 @@ class StaticBody:
 
     Args:
         name: unique among bodies and dolls of the scene.
-        shape: a Sphere, Box, Cylinder, Capsule, a Compound of them, a HeightField or a Mesh.
+        shape: a Sphere, Box, Cylinder, Capsule, a Compound of them, a HeightField, a Mesh or a
+            Plane.
         position: (3,) m, of the shape's origin.
         orientation: quaternion x, y, z, w, shape's axes to world axes; normalised.
         friction: Coulomb's coefficient, 0 or more; None: that of the scene's material.
@@ -40,7 +42,7 @@ class StaticBody:
     """
 
     name: str
-    shape: Shape | Compound | Surface
+    shape: Shape | Compound | Surface | Plane
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Quaternion = IDENTITY
     friction: float | None = None
@@ -52,9 +54,9 @@ class StaticBody:
         set_fields(self, position=finite_floats('position', self.position),
                    orientation=unit_vector('orientation', self.orientation,
                                            'a quaternion x, y, z, w, not zero', 4))
-        if not isinstance(self.shape, Solid | Compound | Surface):
+        if not isinstance(self.shape, Solid | Compound | Surface | Plane):
             raise errors.WrongForm('shape', self.shape,
-                                   'a shape, a Compound of shapes, or a surface')
+                                   'a shape, a Compound of shapes, a surface or a Plane')
         check_surface(self, max_rolling_friction=1e6)
 
     @property
@@ -63,12 +65,19 @@ class StaticBody:
         return Pose(np.array(self.position), np.array(self.orientation))
 
     @property
+    def normal(self) -> Vector:
+        """Its z axis (3,), world frame: of a Plane the normal."""
+        return vector(rotation.rotate(self.orientation, np.array((0.0, 0.0, 1.0))))
+
+    @property
     def parts(self) -> tuple[Part, ...]:
         """Its primitive shapes at their poses in the world frame."""
         return tuple(Part.at(part.shape, self.pose.compose(part.pose)) for part in self.shape.parts)
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """Boxes, cylinders and spheres to draw, at their poses in the world frame."""
+        """Boxes, cylinders and spheres to draw, at their poses in the world frame; none of a
+        surface or a plane, which are drawn as meshes.
+        """
         return tuple(Part.at(piece.shape, self.pose.compose(piece.pose))
                      for piece in self.shape.primitives)

@@ -1,4 +1,4 @@
-"""Mesh files of robots (STL, OBJ, DAE): found, and read by trimesh from the extra `fit`.
+"""Mesh files of robots (STL, OBJ, DAE, glTF): found, and read by trimesh from the extra `fit`.
 
 URDF and SDF name them by package://, model://, file:// or a relative path. Packages are searched in
 ROS_PACKAGE_PATH and AMENT_PREFIX_PATH as in ROS, and in the folders above the URDF, because robots
@@ -15,17 +15,29 @@ from pathlib import Path
 import numpy as np
 
 from ...model import errors, rotation
+from ...model.mesh import Hull, Mesh
 from ...model.pose import Pose
 from ...model.shapes import Box
 from ...model.vectors import vector
 
-SUFFIXES = ('.stl', '.obj', '.dae')
+GLTF_SUFFIXES = ('.glb', '.gltf')
+
+SUFFIXES = ('.stl', '.obj', '.dae', *GLTF_SUFFIXES)
+
+UNSCALED = (1.0, 1.0, 1.0)
+
+GLTF_TO_ROS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""Rotation of glTF's axes, y up, to z up: a right angle about x, as RViz, Drake and Blender have it
+(https://github.com/ros2/rviz/pull/1482)."""
 
 MAX_MESH_BYTES = 64_000_000
 """The largest part of a scanned robot has 20 MB."""
 
 MAX_COORDINATE = 1e5
 """m; a vertex farther from the origin shows a broken file."""
+
+FLAT = 1e-6
+"""Thickness over size up to which points have no hull."""
 
 MIN_THICKNESS = 0.001
 """m; shortest edge of a box around a mesh."""
@@ -80,7 +92,7 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def read_mesh(path: Path, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> np.ndarray:
+def read_mesh(path: Path, scale: tuple[float, ...] = UNSCALED) -> np.ndarray:
     """Triangles (t, 3, 3) m of a mesh file, scaled along each axis.
 
     Raises Unreadable with the reason.
@@ -102,7 +114,10 @@ def read_mesh(path: Path, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> np.ndar
         with contextlib.redirect_stderr(io.StringIO()), np.errstate(all='ignore'):
             mesh = trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type=kind[1:],
                                      process=False, skip_materials=True)
-            triangles = np.asarray(mesh.triangles, float) * _metres_per_unit(mesh.units) * scale
+            triangles = np.asarray(mesh.triangles, float) * _metres_per_unit(mesh.units)
+            if kind in GLTF_SUFFIXES:
+                triangles = triangles @ GLTF_TO_ROS.T
+            triangles = triangles * scale
     # trimesh does not validate its input: a broken file may raise anything.
     except Exception as error:
         said = ' '.join(f'{type(error).__name__}: {error}'.split())
@@ -112,6 +127,35 @@ def read_mesh(path: Path, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> np.ndar
         raise errors.Unreadable('', f'{len(triangles)} triangles',
                                 f'some, all within {MAX_COORDINATE:g} m')
     return triangles
+
+
+def read_surface(path: Path, scale: tuple[float, ...] = UNSCALED) -> Mesh:
+    """The triangles of a mesh file as a surface. Raises a ModelError."""
+    corners = read_mesh(path, scale)
+    vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    if np.prod(scale) < 0:
+        faces = faces[:, ::-1]  # a mirrored mesh is inside out
+    return Mesh(vertices, faces, source=(str(path), vector(scale)))
+
+
+def read_hull(path: Path, scale: tuple[float, ...] = UNSCALED) -> Hull:
+    """The convex hull of a mesh file. Raises a ModelError."""
+    return convex_hull(read_mesh(path, scale).reshape(-1, 3), source=(str(path), vector(scale)))
+
+
+def convex_hull(points: np.ndarray, source: tuple | None = None) -> Hull:
+    """The convex hull of points (p, 3) m, by Qhull. Raises Unreadable for what has no volume."""
+    spread = np.linalg.eigvalsh(np.cov(points.T))
+    if not spread[0] > FLAT ** 2 * spread[2]:
+        raise errors.Unreadable('', f'{len(points)} points', 'points around a volume')
+    try:
+        from trimesh.convex import convex_hull as hull_of
+        found = hull_of(points)
+    except ImportError:
+        raise errors.Unreadable('', f'{len(points)} points',
+                                "trimesh and scipy for a hull: pip install '.[fit]'") from None
+    return Hull(np.asarray(found.vertices, float), np.asarray(found.faces), source)
 
 
 def bounding_box(triangles: np.ndarray) -> tuple[Box, Pose]:

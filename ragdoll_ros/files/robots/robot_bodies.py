@@ -1,4 +1,5 @@
-"""Static bodies from a URDF or SDF: one of each link that has collision shapes.
+"""Static bodies from a URDF or SDF: one of the primitive shapes of each link, and one of each plane
+and each mesh that a link has.
 
 In a scene's `bodies:` these are the entries `{urdf: FILE}` and `{sdf: FILE}`.
 """
@@ -12,17 +13,19 @@ from typing import Any
 from ...model import errors
 from ...model.compound import Compound
 from ...model.errors import ModelError
+from ...model.mesh import Mesh
+from ...model.plane import Plane
 from ...model.pose import Pose
 from ...model.rotation import IDENTITY
 from ...model.scene import LIMIT_TOLERANCE
-from ...model.shapes import Part, Shape
+from ...model.shapes import Box, Part, Shape
 from ...model.static_body import StaticBody
 from ...model.vectors import Quaternion, Vector, floats
 from ..config import config_folder
 from ..doll import plain_name
-from .mesh_file import bounding_box, find_file, read_mesh
+from .mesh_file import bounding_box, find_file, read_hull, read_mesh, read_surface
 from .sdf_tree import parse_sdf
-from .urdf_tree import UrdfLink, UrdfTree, parse_urdf
+from .urdf_tree import PLANE, UrdfLink, UrdfMesh, UrdfTree, parse_urdf
 from .xml_text import read_xml
 
 PARSERS = {'urdf': ('robot', parse_urdf), 'sdf': ('sdf', parse_sdf)}
@@ -36,8 +39,10 @@ SURFACE = ('friction', 'rolling_friction', 'restitution', 'color')
 
 ROTATING_KINDS = ('revolute', 'continuous')
 
-INSTEAD = {'a <plane>': "the scene's `ground`",
-           'an <include>': 'the model itself, as `gz sdf -p FILE` prints it'}
+MESHES = ('box', 'hull', 'exact')
+"""What `meshes` may be."""
+
+INSTEAD = {'an <include>': 'the model itself, as `gz sdf -p FILE` prints it'}
 """What stands in a scene for an element that no body has; for others PRIMITIVES."""
 
 PRIMITIVES = 'a box, sphere, cylinder or capsule'
@@ -45,20 +50,20 @@ PRIMITIVES = 'a box, sphere, cylinder or capsule'
 
 @dataclass(frozen=True)
 class PlacedRobot:
-    """A body for each link of a file, by the link's name, in the file's frame; and the pose of that
-    frame in the world: ``position`` (3,) m, ``orientation`` x, y, z, w.
+    """The bodies of a file's links, in the file's frame; and the pose of that frame in the world:
+    ``position`` (3,) m, ``orientation`` x, y, z, w.
     """
 
     name: str
-    links: dict[str, StaticBody]
+    links: tuple[StaticBody, ...]
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Quaternion = IDENTITY
 
     def bodies(self) -> Iterator[StaticBody]:
         """The bodies in the world, named robot_link."""
         frame = Pose(floats(self.position), floats(self.orientation))
-        for link, body in self.links.items():
-            yield dataclasses.replace(body, name=plain_name(f'{self.name}_{link}', self.name),
+        for body in self.links:
+            yield dataclasses.replace(body, name=plain_name(f'{self.name}_{body.name}', self.name),
                                       **_placed(frame.compose(body.pose)))
 
 
@@ -80,41 +85,57 @@ def read_robot(entry: dict, folder: Path) -> tuple[PlacedRobot | None, list[Mode
     except ModelError as error:
         return None, [error]
     surface = {name: entry[name] for name in SURFACE if name in entry}
-    links, found = {}, []
+    links: list[StaticBody] = []
+    found: list[ModelError] = []
     for link in (link for name, link in tree.links.items() if name not in left_out):
         try:
             if link.collides:
-                links[link.name] = _body(link, poses[link.name], entry, path.parent, surface)
+                links += _bodies(link, poses[link.name], entry, path.parent, surface)
         except ModelError as error:
             found.append(error.at(f'{key}.({path.name}).link {link.name}'))
     if not links and not found:
         found = [errors.WrongForm(key, entry[key], 'a file with a link that has a <collision>')]
     start = {name: entry[name] for name in ('position', 'orientation') if name in entry}
-    return (None if found else PlacedRobot(entry['name'], links, **start)), found
+    return (None if found else PlacedRobot(entry['name'], tuple(links), **start)), found
 
 
-def _body(link: UrdfLink, pose: Pose, entry: dict, folder: Path, surface: dict) -> StaticBody:
-    """The body of a link, whose frame has the ``pose``. Raises a ModelError for a shape that no
-    body has.
+def _bodies(link: UrdfLink, pose: Pose, entry: dict, folder: Path,
+            surface: dict) -> list[StaticBody]:
+    """The bodies of a link, whose frame has the ``pose``; the second one is named link_2. Raises a
+    ModelError for a shape that no body has.
     """
     for what in link.left_out:
-        raise errors.WrongForm('', what, f'{INSTEAD.get(what, PRIMITIVES)}; leave the link out by '
-                               f'`without: [{link.name}]`')
-    shapes: list[tuple[Shape, Pose]] = list(link.shapes)
+        if what != f'a <{PLANE}>':
+            raise errors.WrongForm('', what, f'{INSTEAD.get(what, PRIMITIVES)}; leave the link out '
+                                   f'by `without: [{link.name}]`')
+    solids: list[tuple[Shape, Pose]] = list(link.shapes)
+    others: list[tuple[Plane | Mesh, Pose]] = [(Plane(), place) for place in link.planes]
     for mesh in link.meshes:
-        if entry.get('meshes') != 'box':
-            raise errors.WrongForm('mesh', mesh.file, f'{PRIMITIVES}; `meshes: box` takes the box '
-                                   'around each mesh')
-        path = find_file(mesh.file, folder)
-        if path is None:
-            raise errors.Unreadable('mesh', mesh.file, 'a file beside this one or in a ROS package')
+        shape, place = _mesh_shape(mesh, entry.get('meshes'), folder)
+        if isinstance(shape, Mesh):
+            others.append((shape, place))
+        else:
+            solids.append((shape, place))
+    found: list[tuple[Any, Pose]] = solids if len(solids) == 1 else [
+        (Compound(tuple(Part.at(shape, place) for shape, place in solids)), Pose())
+    ] if solids else []
+    return [StaticBody(f'{link.name}_{number}' if number > 1 else link.name, whole,
+                       **_placed(pose.compose(place)), **surface)
+            for number, (whole, place) in enumerate(found + others, 1)]
+
+
+def _mesh_shape(mesh: UrdfMesh, how: str | None, folder: Path) -> tuple[Box | Mesh, Pose]:
+    """The shape for a mesh, one of MESHES, and its pose in the link's frame."""
+    if how is None:
+        raise errors.WrongForm('mesh', mesh.file, f'{PRIMITIVES}; or `meshes: exact` for its '
+                               'triangles, `hull` for its convex hull, `box` for the box around it')
+    path = find_file(mesh.file, folder)
+    if path is None:
+        raise errors.Unreadable('mesh', mesh.file, 'a file beside this one or in a ROS package')
+    if how == 'box':
         box, place = bounding_box(read_mesh(path, mesh.scale))
-        shapes.append((box, mesh.pose.compose(place)))
-    if len(shapes) == 1:
-        (shape, place), = shapes
-        return StaticBody(link.name, shape, **_placed(pose.compose(place)), **surface)
-    whole = Compound(tuple(Part.at(shape, place) for shape, place in shapes))
-    return StaticBody(link.name, whole, **_placed(pose), **surface)
+        return box, mesh.pose.compose(place)
+    return (read_hull if how == 'hull' else read_surface)(path, mesh.scale), mesh.pose
 
 
 def _placed(pose: Pose) -> dict[str, Any]:

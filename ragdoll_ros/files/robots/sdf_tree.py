@@ -13,7 +13,7 @@ from ...model import errors, rotation
 from ...model.pose import Pose
 from ...model.shapes import SIZES
 from .sdf_frames import SdfModel, child_text
-from .urdf_tree import UrdfJoint, UrdfLink, UrdfMesh, UrdfTree, add_shape
+from .urdf_tree import PLANE, UrdfJoint, UrdfLink, UrdfMesh, UrdfTree, add_plane, add_shape
 from .xml_text import parse_numbers, parse_root
 
 WORLD = ''
@@ -129,6 +129,9 @@ def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose) -> N
         add_shape(link, kind, {key: tuple(found.tolist()) if key == 'size' else float(found[0])
                                for key, found in sizes.items()}, pose)
     elif kind != 'empty':
+        if kind == PLANE:
+            normal = parse_numbers(element.findtext('normal', '0 0 1'), 3, f'{where}.plane.normal')
+            add_plane(link, normal, pose, f'{where}.plane.normal')
         link.left_out.append('a <submesh>' if kind == 'mesh' else f'a <{kind}>')
 
 

@@ -14,6 +14,11 @@ from ...model.ragdoll import tree_errors
 from ...model.shapes import SHAPES, SIZES, Shape
 from .xml_text import parse_numbers, parse_root
 
+SHORTEST = 1e-9
+"""Length from which on a vector is a direction."""
+
+PLANE = 'plane'
+
 JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
 
 
@@ -37,6 +42,8 @@ class UrdfLink:
     """(3, 3) kg m^2 about the centre of mass, in the axes of ``centre``."""
     shapes: list[tuple[Shape, Pose]] = field(default_factory=list)
     meshes: list[UrdfMesh] = field(default_factory=list)
+    planes: list[Pose] = field(default_factory=list)
+    """Frames whose z axis is the normal, of planes that static bodies have."""
     left_out: list[str] = field(default_factory=list)
     """Tags of geometries that no doll has."""
     collides: bool = False
@@ -142,11 +149,22 @@ def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose, wher
         scale = tuple(_vector(element, 'scale', where, (1, 1, 1)))
         link.meshes.append(UrdfMesh(_text(element, 'filename', f'{where}.mesh'), scale, pose))
     elif kind not in SIZES:
+        if kind == PLANE:
+            normal = _vector(element, 'normal', where, (0, 0, 1))
+            add_plane(link, normal, pose, f'{where}.plane.normal')
         link.left_out.append(f'a <{kind}>')
     else:
         sizes = {key: tuple(_vector(element, key, where)) if key == 'size'
                  else _number(element, key, where) for key in SIZES[kind]}
         add_shape(link, kind, sizes, pose)
+
+
+def add_plane(link: UrdfLink, normal: np.ndarray, pose: Pose, where: str) -> None:
+    """Add a plane through the origin of ``pose`` with a ``normal`` (3,) in its axes to the link."""
+    if np.linalg.norm(normal) < SHORTEST:
+        raise errors.NotUnit(where, normal.tolist(), 'a direction, not zero')
+    turn = rotation.shortest_arc(np.array([0.0, 0, 1]), normal / np.linalg.norm(normal))
+    link.planes.append(pose.compose(Pose(orientation=turn)))
 
 
 def add_shape(link: UrdfLink, kind: str, sizes: dict, pose: Pose) -> None:
@@ -174,7 +192,7 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
         ends.append(_text(found, 'link', f'{where}.{end}'))
     found = element.find('axis')
     axis = np.array([1.0, 0, 0]) if found is None else _vector(found, 'xyz', where)
-    if np.linalg.norm(axis) < 1e-9:
+    if np.linalg.norm(axis) < SHORTEST:
         if kind in ('revolute', 'continuous'):
             raise errors.NotUnit(f'{where}.axis', axis.tolist(), 'a direction, not zero')
         axis = np.array([1.0, 0, 0])

@@ -23,8 +23,10 @@ collision/triangles/triangle.py."""
 
 GEOM_PAIR = np.dtype([
     ('a', np.int64), ('b', np.int64), ('friction', float), ('rolling_friction', float),
-    ('restitution', float)], align=True)
-"""Two geoms that may collide, and the parameters of their contact; a static one is ``b``."""
+    ('restitution', float), ('point', np.int64)], align=True)
+"""Two geoms that may collide, and the parameters of their contact; a static one is ``b``. With a
+plane there is a pair for each ``point`` of ``a`` that may touch it, one after the other, as each
+has a gap of its own; see ground_point() of contact/gaps.py."""
 
 JOINT_LIMIT = np.dtype([('q', np.int64), ('dof', np.int64), ('lower', float), ('upper', float)],
                        align=True)

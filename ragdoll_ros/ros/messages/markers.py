@@ -9,7 +9,6 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from ...model import rotation, static_body
-from ...model.mesh import Surface
 from ...model.pose import Pose
 from ...model.push import Push
 from ...model.ragdoll import DEFAULT_COLOR, Ragdoll
@@ -49,7 +48,7 @@ class SceneMarkers:
         self._static = [(body, part) for body in scene.bodies for part in body.primitives]
         self._static_poses = np.array([(*part.position, *part.orientation)
                                        for _, part in self._static]).reshape(-1, 7)
-        self._surfaces = [body for body in scene.bodies if isinstance(body.shape, Surface)]
+        self._surfaces = [body for body in scene.bodies if not body.shape.primitives]
         self._arrow_count = self._message_count = 0
 
     def serialize(self, stamp: int, state: State, pushes: Sequence[Push],
@@ -154,7 +153,7 @@ def _static_markers(header: Header, parts: Sequence[tuple[static_body.StaticBody
 
 def _surface_markers(header: Header, bodies: Sequence[static_body.StaticBody]
                      ) -> tuple[list[Marker], np.ndarray]:
-    """Markers of static bodies that are surfaces, with nothing that changes."""
+    """Markers of static bodies that are surfaces or planes, with nothing that changes."""
     markers = []
     for body in bodies:
         vertices, faces = body.shape.mesh()

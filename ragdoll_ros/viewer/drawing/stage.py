@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from ...model import rotation
-from ...model.mesh import Surface
+from ...model.plane import Plane
 from ...model.scene import Scene
 from ...model.static_body import DEFAULT_COLOR
 from ..sources.source import Frame
@@ -96,7 +96,7 @@ def draw_ground(server: viser.ViserServer, scene: Scene, dark: bool) -> None:
 
 
 def draw_static_bodies(server: viser.ViserServer, scene: Scene) -> None:
-    """Draw the static bodies: their parts of one kind in one batch, and each surface."""
+    """Draw the static bodies: their parts of one kind in one batch, and each surface and plane."""
     parts = [(part, body.color or DEFAULT_COLOR)
              for body in scene.bodies for part in body.primitives]
     for kind in MESHES:
@@ -111,13 +111,16 @@ def draw_static_bodies(server: viser.ViserServer, scene: Scene) -> None:
                 batched_colors=np.round(linear(np.array(colors)) * 255).astype(np.uint8),
                 lod='off')
     for index, body in enumerate(scene.bodies):
-        if isinstance(body.shape, Surface):
+        if not body.shape.primitives:
             red, green, blue = (body.color or DEFAULT_COLOR)[:3]
             vertices, faces = body.shape.mesh()
+            is_plane = isinstance(body.shape, Plane)
+            # A plane hides nothing from below, and nothing is behind it to be in its shadow.
             server.scene.add_mesh_simple(
                 f'/scene/static/surface_{index}', vertices.astype(np.float32),
                 faces.astype(np.uint32), color=(red, green, blue), flat_shading=True,
-                side='double', wxyz=np.array(body.orientation)[WXYZ], position=body.position)
+                side='front' if is_plane else 'double', cast_shadow=not is_plane,
+                wxyz=np.array(body.orientation)[WXYZ], position=body.position)
 
 
 def configure_lights(server: viser.ViserServer) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Sequence
 import viser
 
 from ...model import errors
-from ...model.mesh import Surface
 from ...model.scene import Scene
 from ..browser.scripts import style
 from ..widgets.bone_tree import BoneTree
@@ -79,11 +78,10 @@ class EditorPanel:
             None if self.static.value == NO_BODY else self.static.value))
 
     def show_static(self, scene: Scene, selected: str | None) -> None:
-        """List the first MOST_LISTED static bodies, of which one may be selected; no surfaces,
-        whose triangles have no fields.
+        """List the first MOST_LISTED static bodies, of which one may be selected; no surfaces or
+        planes, which have no fields.
         """
-        names = (body.name for body in scene.bodies[:MOST_LISTED]
-                 if not isinstance(body.shape, Surface))
+        names = (body.name for body in scene.bodies[:MOST_LISTED] if body.shape.primitives)
         with self._filling:
             _set_options(self.static, (NO_BODY, *names), selected or NO_BODY)
         self.remove_static.visible = selected is not None

@@ -150,12 +150,16 @@ def _material_of(scene: Scene, placement: Placement, bone: Bone) -> tuple[float,
     return friction, rolling_friction, restitution
 
 
-def make_pairs(geom_pairs: np.ndarray, laws: np.ndarray) -> np.ndarray:
-    """GEOM_PAIR records of pairs of geoms (p, 2), by the ``laws`` (g, 3) of their materials."""
+def make_pairs(geom_pairs: np.ndarray, laws: np.ndarray,
+               points: np.ndarray | int = 0) -> np.ndarray:
+    """GEOM_PAIR records of pairs of geoms (p, 2), by the ``laws`` (g, 3) of their materials;
+    ``points`` (p,) of what is paired with planes.
+    """
     pairs = np.zeros(len(geom_pairs), GEOM_PAIR)
     if len(geom_pairs):
         pairs['a'], pairs['b'] = geom_pairs.T
         law = contact_law(laws[geom_pairs[:, 0]], laws[geom_pairs[:, 1]])
+        pairs['point'] = points
         pairs['friction'], pairs['rolling_friction'], pairs['restitution'] = law.T
     return pairs
 

@@ -591,11 +591,13 @@ class Clusters:
         systems = [self._systems[doll] for doll in dolls]
         bones, q, v = (np.concatenate([parts[doll] for doll in dolls])
                        for parts in (self._bones, self._q, self._v))
-        touching, static_geoms = self._static_pairs(systems, bones, keys)
-        geom_pairs = np.concatenate([_pairs_of_dolls(dolls, systems, pairs), touching])
+        touching, points, static_geoms = self._static_pairs(systems, bones, keys)
+        doll_pairs = _pairs_of_dolls(dolls, systems, pairs)
+        geom_pairs = np.concatenate([doll_pairs, touching])
+        points = np.concatenate([np.zeros(len(doll_pairs), np.int64), points])
         laws = np.concatenate([*(self._laws[doll] for doll in dolls),
                                self.static_geoms.laws[static_geoms]])
-        system = join_systems(systems, make_pairs(geom_pairs, laws),
+        system = join_systems(systems, make_pairs(geom_pairs, laws, points),
                               self.static_geoms.geoms[static_geoms])
         state = make_cluster_state(system, contact_capacity(system))._replace(
             q=self.q[q], v=self.v[v], contact_impulses=self.contact_impulses[bones],
@@ -605,9 +607,10 @@ class Clusters:
                              [make_workspace(system, state)])
 
     def _static_pairs(self, systems: list[System], bones: np.ndarray,
-                      keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs (p, 2) of geoms of joined ``systems`` with static ones, which follow them; and
-        these, indices (s,) among the scene's.
+                      keys: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pairs (p, 2) of geoms of joined ``systems`` with static ones, which follow them; which
+        points (p,) of geoms those with planes are of; and the static ones, indices (s,) among the
+        scene's.
         """
         bone_of_geom = np.concatenate([
             own[system.tree['bone'][system.geoms['body']]] for system, own in zip(
@@ -619,7 +622,12 @@ class Clusters:
         begin = np.searchsorted(bone_of_geom, near_bones)
         count = np.searchsorted(bone_of_geom, near_bones, side='right') - begin
         geoms = np.repeat(begin - np.cumsum(count) + count, count) + np.arange(count.sum())
-        return np.stack([geoms, len(bone_of_geom) + np.repeat(place, count)], 1), static_geoms
+        place = np.repeat(place, count)
+        pairs = np.stack([geoms, len(bone_of_geom) + place], 1)
+        kinds = np.concatenate([system.geoms['kind'] for system in systems])[geoms]
+        repeats = self.static_geoms.pair_counts(kinds, static_geoms[place])
+        points = np.arange(repeats.sum()) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+        return np.repeat(pairs, repeats, axis=0), points, static_geoms
 
 
 def _pairs_of_dolls(dolls: np.ndarray, systems: list[System], pairs: np.ndarray) -> np.ndarray:

@@ -7,19 +7,24 @@ import numpy as np
 
 from ....model import rotation
 from ....model.mesh import Surface
+from ....model.plane import Plane
 from ....model.scene import Scene
 from ....model.scene_change import SceneChange
 from ....model.shapes import Part, support_distance
-from ...kernels.collision.shapes import SHAPE_KIND
+from ....model.static_body import StaticBody
+from ...kernels.collision.shapes import PLANE, SHAPE_KIND
 from ...kernels.dynamics.body import WORLD
 from ...kernels.loaded import aabb_tree
 from ...kernels.system import GEOM
-from .build_system import bounding_radius, geom_size
+from .build_system import GROUND_POINTS, bounding_radius, geom_size
 from .triangle_geoms import triangle_geoms
 
 LOOK_AHEAD = 0.1
 """s: what a bone may touch within this time is given to its cluster, when it has to be made anew;
 then it is made anew less often."""
+
+POINT_COUNTS = np.array([GROUND_POINTS[name] for name in sorted(SHAPE_KIND, key=SHAPE_KIND.get)])
+"""Points that may touch the ground or a plane, by the kind of shape."""
 
 NO_KEYS = np.zeros(0, np.int64)
 
@@ -35,20 +40,26 @@ class StaticGeoms:
         surfaces = [(index, body) for index, body in enumerate(scene.bodies)
                     if isinstance(body.shape, Surface)]
         parts = [(index, part) for index, body in enumerate(scene.bodies) for part in body.parts]
+        planes = [(index, body) for index, body in enumerate(scene.bodies)
+                  if isinstance(body.shape, Plane)]
         own = [_primitive_geoms([part for _, part in parts]),
                *(triangle_geoms(body.shape.triangles, body.pose) for _, body in surfaces)]
-        self.geoms = np.concatenate([geoms for geoms, _, _ in own])
-        """(g,): of primitive shapes, then triangles of surfaces."""
+        self.geoms = np.concatenate([*(geoms for geoms, _, _ in own),
+                                     _plane_geoms([body for _, body in planes])])
+        """(g,): of primitive shapes, then triangles of surfaces, then planes."""
         self.bodies = np.concatenate([np.array([index for index, _ in parts], np.int64), *(
             np.full(len(geoms), index) for (index, _), (geoms, _, _) in zip(
-                surfaces, own[1:], strict=True))])
+                surfaces, own[1:], strict=True)),
+            np.array([index for index, _ in planes], np.int64)])
         """(g,): index of each geom's body in the scene's bodies."""
         laws = np.array([scene.material.on(body) for body in scene.bodies]).reshape(-1, 3)
         self.laws = laws[self.bodies]
         """(g, 3): friction, rolling friction, m, and restitution of each geom."""
         self._tree = aabb_tree.make_aabb_tree(
             *(np.concatenate([box[side] for _, *box in own]) for side in range(2))
-        ) if len(self.geoms) else None
+        ) if len(self.geoms) > len(planes) else None
+        self._normals = np.array([body.normal for _, body in planes]).reshape(-1, 3)
+        self._offsets = np.array([np.dot(body.normal, body.position) for _, body in planes])
         self._reach = np.ascontiguousarray(reach)
         self._doll_of_bone = scene.doll_of_bone
         self._first_keys = len(self.geoms) * np.array(
@@ -60,7 +71,7 @@ class StaticGeoms:
         """See that all pairs that may touch within ``duration`` s are known, of ``moving`` dolls
         (d,). Returns whether others are than before. ``states`` (n, 13) of all bones.
         """
-        if self._tree is None:
+        if not len(self.geoms):
             return False
         near = self._find(states, duration, moving)
         place = np.searchsorted(self._keys, near)
@@ -86,6 +97,12 @@ class StaticGeoms:
     def bones_and_geoms(self, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The bones and the geoms (k,) of pairs."""
         return np.divmod(keys, max(1, len(self.geoms)))
+
+    def pair_counts(self, kinds: np.ndarray, geoms: np.ndarray) -> np.ndarray:
+        """Numbers of GEOM_PAIR records (k,) of geoms of these ``kinds`` with static ones: with a
+        plane one for each point that may touch it.
+        """
+        return np.where(self.geoms['kind'][geoms] == PLANE, POINT_COUNTS[kinds], 1)
 
     def clear(self) -> None:
         """Forget all pairs."""
@@ -116,12 +133,35 @@ class StaticGeoms:
 
     def _find(self, states: np.ndarray, ahead: float, moving: np.ndarray) -> np.ndarray:
         """Pairs (k,) that may touch within ``ahead`` s, of ``moving`` dolls (d,), sorted."""
-        count = aabb_tree.find_near(self._tree, states, self._reach, moving[self._doll_of_bone],
-                                    ahead, self._found)
+        chosen = moving[self._doll_of_bone]
+        planes = self._near_planes(states, ahead, chosen) if len(self._offsets) else NO_KEYS
+        if self._tree is None:
+            return planes
+        count = aabb_tree.find_near(self._tree, states, self._reach, chosen, ahead, self._found)
         if count > len(self._found):
             self._found = np.zeros(2 * count, np.int64)
             return self._find(states, ahead, moving)
-        return np.sort(self._found[:count])
+        # The tree knows of the geoms before the planes alone.
+        bones, geoms = np.divmod(self._found[:count], len(self.geoms) - len(self._offsets))
+        return np.sort(np.concatenate([bones * len(self.geoms) + geoms, planes]))
+
+    def _near_planes(self, states: np.ndarray, ahead: float, chosen: np.ndarray) -> np.ndarray:
+        """Pairs (k,) of ``chosen`` bones (n,) and planes that may touch within ``ahead`` s."""
+        speed = (np.linalg.norm(states[:, 7:10], axis=1)
+                 + self._reach * np.linalg.norm(states[:, 10:13], axis=1))
+        radius = self._reach + aabb_tree.MARGIN + aabb_tree.IMPACT_SPEEDUP * ahead * speed
+        height = states[:, :3] @ self._normals.T - self._offsets
+        bones, planes = np.nonzero(chosen[:, None] & (height <= radius[:, None]))
+        return bones * len(self.geoms) + len(self.geoms) - len(self._offsets) + planes
+
+
+def _plane_geoms(bodies: Sequence[StaticBody]) -> np.ndarray:
+    """GEOM (p,) of planes."""
+    geoms = np.zeros(len(bodies), GEOM)
+    for geom, body in zip(geoms, bodies, strict=True):
+        geom['body'], geom['kind'] = WORLD, PLANE
+        geom['position'], geom['orientation'] = body.position, body.orientation
+    return geoms
 
 
 Geoms = tuple[np.ndarray, np.ndarray, np.ndarray]

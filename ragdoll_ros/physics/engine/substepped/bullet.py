@@ -15,11 +15,13 @@ import numpy as np
 from ....files.urdf import to_urdf
 from ....model import errors, rotation
 from ....model.coordinates import GeneralizedState
+from ....model.plane import Plane
 from ....model.ragdoll import Bone, Ragdoll
 from ....model.scene import Placement, Scene, finite_friction
 from ....model.shapes import Shape
 from ....model.state import State
 from ....model.static_body import StaticBody
+from ....model.vectors import Vector
 from ...accuracy import Accuracy
 from ...rigid_body import damping_rate
 from ..protocol import GROUND, AppliedWrench, Contacts, Wrenches, allowed_penetration
@@ -96,16 +98,14 @@ class _World:
         ground = self.scene.ground
         if ground is None:
             return
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_PLANE, planeNormal=ground.normal, physicsClientId=self._client)
-        body = pybullet.createMultiBody(0, shape, -1, [n * ground.offset for n in ground.normal],
-                                        physicsClientId=self._client)
-        self._set_material(body, -1, None)
-        yield body
+        x, y, z = (n * ground.offset for n in ground.normal)
+        yield self._add_plane(ground.normal, (x, y, z), None)
 
     def _add_bodies(self) -> Iterator[tuple[int, int]]:
         """Add each part of the static bodies as a body of its own; these, and the scene's."""
         for index, one in enumerate(self.scene.bodies):
+            if isinstance(one.shape, Plane):
+                yield self._add_plane(one.normal, one.position, one), index
             for part in one.parts:
                 shape = pybullet.createCollisionShape(
                     _GEOMS[part.kind], physicsClientId=self._client, **_sizes(part.shape))
@@ -113,6 +113,14 @@ class _World:
                                                 physicsClientId=self._client)
                 self._set_material(body, -1, one)
                 yield body, index
+
+    def _add_plane(self, normal: Vector, position: Vector, owner: StaticBody | None) -> int:
+        """Add the half space below a plane with the material of its ``owner``."""
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_PLANE, planeNormal=normal, physicsClientId=self._client)
+        body = pybullet.createMultiBody(0, shape, -1, position, physicsClientId=self._client)
+        self._set_material(body, -1, owner)
+        return body
 
     def _add_doll(self, placement: Placement) -> _Doll:
         doll = placement.doll

@@ -6,7 +6,7 @@ import contextlib
 
 import numpy as np
 
-from ....files.mjcf import to_mjcf
+from ....files.mjcf import static_geoms, to_mjcf
 from ....model import errors, rotation
 from ....model.coordinates import GeneralizedState
 from ....model.ragdoll import Joint, joint_frame
@@ -164,7 +164,7 @@ class MujocoEngine(SubsteppedEngine):
         self._static = {
             self._model.geom(f'bodies/{body.name}/{number}').id: index
             for index, body in enumerate(self.scene.bodies)
-            for number, _ in enumerate(body.parts, 1)}
+            for number, _ in enumerate(static_geoms(body), 1)}
         self._doll_of = np.full(self._model.ngeom, GROUND)
         self._doll_of[list(self._bone_of)] = self.scene.doll_of_bone[list(self._bone_of.values())]
         self._roots, self._balls = [], []

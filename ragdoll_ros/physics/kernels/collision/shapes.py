@@ -3,7 +3,9 @@
 Kinds and sizes, m: sphere (radius, 0, 0); capsule (radius, half length of its axis, 0); box (half
 extents); cylinder (radius, half length, 0). The axis of a capsule or cylinder is its own z axis.
 These are symmetric about their centre, so that their support functions are even. A triangle, of a
-static surface, is not, and has functions of its own: see triangles/triangle.py.
+static surface, is not, and has functions of its own: see triangles/triangle.py. A plane through its
+position, its z axis the normal, is no shape of these functions: contact/gaps.py treats it as the
+ground.
 """
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..maths.vectors import Vec3, divide, norm, to_local, to_world, vec
 
-SPHERE, CAPSULE, BOX, CYLINDER, TRIANGLE = 0, 1, 2, 3, 4
+SPHERE, CAPSULE, BOX, CYLINDER, TRIANGLE, PLANE = 0, 1, 2, 3, 4, 5
 """Kinds of shapes. Spheres and capsules, which are a core with a radius, come first."""
 
 SHAPE_KIND = {'sphere': SPHERE, 'capsule': CAPSULE, 'box': BOX, 'cylinder': CYLINDER}

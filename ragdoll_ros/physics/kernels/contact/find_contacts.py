@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from ..collision.narrow_phase import collide
-from ..collision.shapes import CYLINDER, TRIANGLE
+from ..collision.shapes import CYLINDER, PLANE, TRIANGLE
 from ..collision.triangles.triangle_manifold import ON_FACE
 from ..compiling.decorators import compiled
 from ..contact_kind import FRICTIONAL, LIMIT, ROLLING
@@ -15,7 +15,7 @@ from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Contacts, Workspace
-from .gaps import MET, TOUCHING, ground_point
+from .gaps import MET, TOUCHING, ground_point, plane_of
 from .patch import contract_friction_points
 from .placed_shape import placed_shape
 
@@ -38,7 +38,9 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
         if s.ground_offset[0] > -math.inf:
             for j in range(s.geoms[k].point_count):
                 if gaps[n + j] <= TOUCHING and m < len(contacts):
-                    write_ground_contact(s, kin, k, j, n + j, contacts[m])
+                    contacts[m].id, contacts[m].patch = n + j, k
+                    write_ground_contact(s, kin, k, j, vec(s.ground_normal), s.ground_offset[0],
+                                         s.geoms[k], contacts[m])
                     m += 1
         n += s.geoms[k].point_count
     for k in range(len(s.joint_limits)):
@@ -48,7 +50,14 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
                 m += 1
         n += 2
     for k in range(len(s.pairs)):
-        if gaps[n + k] <= TOUCHING:
+        if gaps[n + k] <= TOUCHING and s.geoms[s.pairs[k].b].kind == PLANE:
+            if m < len(contacts):
+                pair = s.pairs[k]
+                normal, offset = plane_of(kin, pair.b)
+                contacts[m].id, contacts[m].patch = n + k, len(s.geoms) + k - pair.point
+                write_ground_contact(s, kin, pair.a, pair.point, normal, offset, pair, contacts[m])
+                m += 1
+        elif gaps[n + k] <= TOUCHING:
             near = max(margin, ws.gaps[n + k] - gaps[n + k])
             m = add_pair_contacts(s, ws.contacts, kin, k, m, near,
                                   n + len(s.pairs) + IDS_PER_PAIR * k)
@@ -57,22 +66,23 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
 
 
 @compiled
-def write_ground_contact(s: System, kin: Kinematics, k: int, point: int, id_: int,
-                         c: np.record) -> None:
-    """Write to ``c`` the contact of geom k's ``point`` with the ground, see gaps.ground_point(),
-    but for what set_friction_points() writes; ``id_``: index of its gap.
+def write_ground_contact(s: System, kin: Kinematics, k: int, point: int, normal: Vec3,
+                         offset: float, law: np.record, c: np.record) -> None:
+    """Write to ``c`` the contact of geom k's ``point``, see gaps.ground_point(), with the ground or
+    a plane of this ``normal`` and ``offset``, but for id, patch and what set_friction_points()
+    writes; ``law``: the geom or the pair, whose friction and restitution count.
     """
-    geom, normal = s.geoms[k], vec(s.ground_normal)
-    c.kind = ROLLING if geom.rolling_friction > 0 else FRICTIONAL
-    c.body_a, c.body_b, c.id, c.patch = geom.body, WORLD, id_, k
+    geom = s.geoms[k]
+    c.kind = ROLLING if law.rolling_friction > 0 else FRICTIONAL
+    c.body_a, c.body_b = geom.body, WORLD
     put(c.point, ground_point(geom, point, kin.geom_positions[k], kin.geom_rotations[k], normal))
     put(c.normal, normal)
-    high = -s.ground_offset[0]
+    high = -offset
     for e in range(3):
         high += c.point[e] * c.normal[e]
     c.gap = high
-    c.friction, c.rolling_friction = geom.friction, geom.rolling_friction
-    c.restitution = geom.restitution
+    c.friction, c.rolling_friction = law.friction, law.rolling_friction
+    c.restitution = law.restitution
 
 
 @compiled
@@ -134,7 +144,7 @@ def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) 
     """
     found, begin = contacts.found, 0
     while begin < m:
-        patch, end = found[begin].patch, patch_end(found, begin, m)
+        end = patch_end(found, begin, m)
         if found[begin].kind == LIMIT:
             begin = end
             continue
@@ -143,11 +153,29 @@ def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) 
             set_tangents(c)
             put(c.friction_point, vec(c.point))
             c.patch_share = 1.0
-        if end - begin > 2 and patch < len(s.geoms) and s.geoms[patch].kind == CYLINDER:
-            contract_to_disc(s.geoms[patch], patch, kin, found, begin, end)
+        disc = cylinder_of_patch(s, found[begin].patch) if end - begin > 2 else -1
+        if disc >= 0:
+            contract_to_disc(s.geoms[disc], disc, kin, found, begin, end)
         elif end - begin > 1:
             contract_friction_points(contacts, begin, end)
         begin = end
+
+
+@compiled
+def is_on_plane(s: System, patch: int) -> bool:
+    """Whether a contact patch is with the ground or a plane, where each point has its own gap; or
+    of none, as a limit's.
+    """
+    return patch < len(s.geoms) or s.geoms[s.pairs[patch - len(s.geoms)].b].kind == PLANE
+
+
+@compiled
+def cylinder_of_patch(s: System, patch: int) -> int:
+    """Index of the cylinder that has this contact patch with the ground or a plane, else -1."""
+    if not is_on_plane(s, patch):
+        return -1
+    k = patch if patch < len(s.geoms) else s.pairs[patch - len(s.geoms)].a
+    return k if s.geoms[k].kind == CYLINDER else -1
 
 
 @compiled
@@ -161,7 +189,7 @@ def patch_end(contacts: np.ndarray, begin: int, m: int) -> int:
 
 @compiled
 def face_center(geom: np.record, k: int, kin: Kinematics, c: np.record) -> Vec3:
-    """Center, m, of the face of cylinder k that has contact c with the ground."""
+    """Center, m, of the face of cylinder k that has contact c with a plane."""
     axis = column(kin.geom_rotations[k], 2)
     low = -geom.size[1] if dot(axis, vec(c.normal)) > 0 else geom.size[1]
     return add_scaled(vec(kin.geom_positions[k]), low, axis)
@@ -170,7 +198,7 @@ def face_center(geom: np.record, k: int, kin: Kinematics, c: np.record) -> Vec3:
 @compiled
 def contract_to_disc(geom: np.record, k: int, kin: Kinematics, contacts: np.ndarray, begin: int,
                      end: int) -> None:
-    """Write friction points of contacts begin to end - 1, the face of cylinder k on the ground: at
+    """Write friction points of contacts begin to end - 1, the face of cylinder k on a plane: at
     two thirds of the radius, the mean distance of a disc's points from its center.
     """
     center = face_center(geom, k, kin, contacts[begin])

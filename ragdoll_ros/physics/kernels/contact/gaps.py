@@ -11,11 +11,11 @@ import math
 import numpy as np
 
 from ..collision.narrow_phase import separation
-from ..collision.shapes import BOX, CAPSULE, SPHERE, extent
+from ..collision.shapes import BOX, CAPSULE, PLANE, SPHERE, extent
 from ..compiling.decorators import compiled
 from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics, body_velocity, forward_kinematics, place_geoms
-from ..maths.vectors import Vec3, divide, dot, norm, sub, to_local, vec
+from ..maths.vectors import Vec3, column, divide, dot, norm, sub, to_local, vec
 from ..system import JOINT_OUTSIDE_LIMITS, OVERLAPPING, System
 from ..workspace import Contacts, Workspace
 from .internal_edges import FLUSH, is_at_internal_edge
@@ -75,7 +75,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
     for k in range(len(s.geoms)):
         if s.geoms[k].point_count and s.ground_offset[0] > -math.inf:
             ground_gaps(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k],
-                        vec(s.ground_normal), s.ground_offset[0], out)
+                        vec(s.ground_normal), s.ground_offset[0], s.geoms[k].first_point, out)
         n += s.geoms[k].point_count
     for k in range(len(s.joint_limits)):
         limit = s.joint_limits[k]
@@ -91,6 +91,13 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
             out[n + k] = EXCLUDED
             continue
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
+        if b.kind == PLANE:
+            if s.pairs[k].point == 0:
+                normal, offset = plane_of(kin, s.pairs[k].b)
+                i = s.pairs[k].a
+                ground_gaps(a, kin.geom_positions[i], kin.geom_rotations[i], normal, offset, n + k,
+                            out)
+            continue
         least = before[n + k] - 2 * (geom_motion_bound(motion, a, h)
                                      + geom_motion_bound(motion, b, h))
         if least > NEAR:
@@ -145,13 +152,20 @@ def geom_motion_bound(motion: np.ndarray, geom: np.record, h: float) -> float:
 
 
 @compiled
+def plane_of(kin: Kinematics, k: int) -> tuple[Vec3, float]:
+    """Normal and offset, m, of a plane, geom k."""
+    normal = column(kin.geom_rotations[k], 2)
+    return normal, dot(normal, vec(kin.geom_positions[k]))
+
+
+@compiled
 def ground_gaps(geom: np.record, position: np.ndarray, r: np.ndarray, normal: Vec3, offset: float,
-                out: np.ndarray) -> None:
-    """Write the heights, m, of a geom's ground points to ``out`` from geom.first_point on, in the
-    order of ground_point(). ``position``, ``r``: the geom's pose; ``offset``: the ground's.
+                first: int, out: np.ndarray) -> None:
+    """Write the heights, m, of a geom's ground points to ``out`` from ``first`` on, in the order of
+    ground_point(). ``position``, ``r``: the geom's pose; ``normal``, ``offset``: of the ground or a
+    plane.
     """
     high = dot(vec(position), normal) - offset
-    first = geom.first_point
     if high > geom.bounding_radius + FAR:
         for k in range(geom.point_count):
             out[first + k] = high - geom.bounding_radius

@@ -9,13 +9,12 @@ import math
 
 import numpy as np
 
-from ..collision.shapes import CYLINDER
 from ..compiling.decorators import compiled
 from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import Vec3, add_scaled, vec
 from ..system import System
 from ..workspace import Contacts
-from .find_contacts import face_center
+from .find_contacts import cylinder_of_patch, face_center
 from .patch import DEGENERATE, sort_corners
 from .slip_integrals import Moments, disc_moments, polygon_moments, segment_moments
 
@@ -35,11 +34,12 @@ def measure_face(s: System, contacts: Contacts, kin: Kinematics, begin: int, end
                  middle: Vec3) -> tuple[Vec3, Face]:
     """Center, m, and face of a patch whose points have this ``middle``, m."""
     found, count, u, v = contacts.found, end - begin, contacts.u, contacts.v
-    patch, first = found[begin].patch, found[begin]
-    if count > 2 and patch < len(s.geoms) and s.geoms[patch].kind == CYLINDER:
-        radius = s.geoms[patch].size[0]
+    first = found[begin]
+    disc = cylinder_of_patch(s, first.patch) if count > 2 else -1
+    if disc >= 0:
+        radius = s.geoms[disc].size[0]
         spread = 4 / (radius * radius)
-        return (face_center(s.geoms[patch], patch, kin, first),
+        return (face_center(s.geoms[disc], disc, kin, first),
                 (DISC, radius, 0.0, spread, 0.0, spread, math.sqrt(0.5)))
     corners = sort_corners(contacts, begin, end, middle)
     area = x = y = xx = xy = yy = 0.0

@@ -7,8 +7,10 @@ import numpy as np
 
 from ..cluster_state import ClusterState
 from ..collision.narrow_phase import collide
+from ..collision.shapes import PLANE
 from ..compiling.decorators import compiled
-from ..contact.gaps import FAR, NEAR, TOUCHING, ground_point, update_kinematics_and_gaps
+from ..contact.gaps import (FAR, NEAR, TOUCHING, ground_point, plane_of,
+                            update_kinematics_and_gaps)
 from ..contact.jacobian import root_of
 from ..contact.placed_shape import placed_shape
 from ..dynamics.body import WORLD
@@ -101,7 +103,13 @@ def pair_time_to_close(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
     """
     pair, manifold = s.pairs[k], ws.contacts.manifold
     a, b = s.geoms[pair.a], s.geoms[pair.b]
-    if gap < NEAR:
+    if b.kind == PLANE and gap < FAR:
+        normal, _ = plane_of(kin, pair.b)
+        point = ground_point(a, pair.point, kin.geom_positions[pair.a], kin.geom_rotations[pair.a],
+                             normal)
+        closing = -normal_velocity(s, kin, q, a.body, point, normal)
+        return time_to_close(gap - contact, closing, acceleration)
+    if b.kind != PLANE and gap < NEAR:
         found = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b), NEAR, manifold)
         least = math.inf
         for j in range(found):

@@ -13,7 +13,7 @@ import numpy as np
 from ..cluster_state import ClusterState
 from ..compiling.cycles import cycles
 from ..compiling.decorators import compiled
-from ..contact.find_contacts import find_contacts, had_met
+from ..contact.find_contacts import find_contacts, had_met, is_on_plane
 from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
 from ..contact.jacobian import contact_velocities
 from ..contact.patch_friction import set_slip_friction
@@ -71,7 +71,7 @@ def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
     after_step = ws.stats[0].ended_without_impact != 0
     for i in range(ws.step.scalars[0].start_contact_count):
         c = ws.contacts.start[i]
-        if after_step and c.patch < len(s.geoms):
+        if after_step and is_on_plane(s, c.patch):
             continue
         if is_approaching(c) and not (
                 had_met(s, cluster.contacts, ws.stats[0].contact_count, c.id)):
