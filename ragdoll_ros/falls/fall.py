@@ -1,6 +1,6 @@
 """One fall: its start, frames, phases, impacts, and the samples of its inertial sensors."""
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from ..model.scene import Scene
 from ..people.fall_phases import Phases, bone_impacts
 from ..physics.sensors.imu import ImuErrors, ImuMount, imu_samples, sensor_motion
 from ..physics.sensors.response import ImuResponse, ResponseFilter
+from .worst_impacts import WorstImpacts
 
 SAMPLE_NAMES = ('ax', 'ay', 'az', 'wx', 'wy', 'wz')
 
@@ -50,6 +51,8 @@ class Fall:
     """Energy gain that no work accounts for, J, at the last valid frame; losses are negative."""
     noise_key: int = 0
     """128-bit key of the random generator (Philox) of the sensor noise."""
+    worst_impacts: WorstImpacts = field(default_factory=lambda: WorstImpacts({}))
+    """Of each region of the body, by the limits of load_limits()."""
 
     @property
     def masses(self) -> np.ndarray:

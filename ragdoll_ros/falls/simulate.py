@@ -3,6 +3,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from ..files.limits import load_limits
 from ..model.coordinates import GeneralizedState
 from ..model.errors import RagdollError
 from ..people import standing
@@ -13,6 +14,7 @@ from ..physics.simulation import Simulation
 from .fall import Fall
 from .recipe import Recipe
 from .start import Start, start_of
+from .worst_impacts import WorstImpacts
 
 
 def generate(recipe: Recipe, falls: Iterable[int]) -> Iterator[Fall]:
@@ -23,7 +25,8 @@ def generate(recipe: Recipe, falls: Iterable[int]) -> Iterator[Fall]:
 
 def simulate(recipe: Recipe, start: Start) -> Fall:
     """Simulate the fall that begins at ``start``."""
-    scene, frames = start.scene, _Recorder(recipe, start)
+    scene, frames, limits = start.scene, _Recorder(recipe, start), load_limits()
+    impacts = WorstImpacts.none_yet(scene, limits)
     # Not 'auto': falls must not depend on which engines are installed.
     with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
         try:
@@ -32,6 +35,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
         except RagdollError as error:
             failure = str(error)
         simulation.samples_per_tick = recipe.samples_per_frame
+        simulation.record_impacts(limits)
         guard, limp = Guard(simulation), list(start.limp)
         while frames.valid < recipe.frames and not failure:
             frames.add(simulation)
@@ -42,6 +46,8 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
                     simulation.go_limp(limp.pop(0).angles)
                 bad = guard.advance()
                 failure = bad.reason if bad else ''
+                if not bad and simulation.impacts:
+                    impacts = impacts.after(simulation.impacts, limits)
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
@@ -50,7 +56,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
-                recipe.philox_key)
+                recipe.philox_key, impacts)
 
 
 class _Recorder:

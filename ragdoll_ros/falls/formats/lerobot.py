@@ -6,7 +6,8 @@ data/chunk-000/file-000.parquet. Numbers are float32. All falls have equally man
 indices of a shard follow from its number.
 
 Labels in meta/episodes: onset, impact (first contact) and rest are the frames of Phases;
-impact_frames and impact_speeds (m/s downwards) are those of each bone's first contact.
+impact_frames and impact_speeds (m/s downwards) are those of each bone's first contact. Of impacts:
+worst_region, worst_peak_force_N and worst_ratio, hic15, and of each of the regions the largest.
 """
 import io
 import json
@@ -143,6 +144,7 @@ def _episode(recipe: Recipe, fall: Fall, place: dict[str, int]) -> dict:
         'impact_frames': [None if np.isnan(frame) else int(frame) for frame in
                           fall.impact_frames.tolist()],
         'impact_speeds': [None if np.isnan(speed) else speed for speed in speeds.tolist()],
+        **_impacts(fall),
         'drawn': json.dumps(fall.drawn, sort_keys=True)}
     for column in columns(recipe, fall):
         values = column.values[:fall.valid].astype(float)
@@ -154,12 +156,28 @@ def _episode(recipe: Recipe, fall: Fall, place: dict[str, int]) -> dict:
     return row
 
 
+def _impacts(fall: Fall) -> dict:
+    """Columns of the worst impacts; None where there is none."""
+    worst, regions = fall.worst_impacts.worst, fall.worst_impacts.by_region
+    hic15 = fall.worst_impacts.hic15
+    return {
+        'worst_region': worst and worst.region, 'worst_peak_force_N': worst and worst.peak_force,
+        'worst_ratio': worst and worst.ratio, 'hic15': None if np.isnan(hic15) else hic15,
+        'regions': list(regions),
+        'region_peak_forces_N': [impact and impact.peak_force for impact in regions.values()],
+        'region_ratios': [impact and impact.ratio for impact in regions.values()]}
+
+
 def _episode_schema(row: dict) -> pa.Schema:
     """Types of an episode's columns, even if a shard has no values of them."""
     kinds = {str: pa.string(), int: pa.int64(), float: pa.float64(), type(None): pa.int64()}
     fields = {key: kinds[type(value)] for key, value in row.items() if not isinstance(value, list)}
     fields.update(tasks=pa.list_(pa.string()), impact_speeds=pa.list_(pa.float64()),
-                  impact_frames=pa.list_(pa.int64()), valid_frames=pa.int64())
+                  impact_frames=pa.list_(pa.int64()), valid_frames=pa.int64(),
+                  worst_region=pa.string(), worst_peak_force_N=pa.float64(),
+                  worst_ratio=pa.float64(), hic15=pa.float64(), regions=pa.list_(pa.string()),
+                  region_peak_forces_N=pa.list_(pa.float64()),
+                  region_ratios=pa.list_(pa.float64()))
     for key in row:
         if key.startswith('stats/'):
             fields[key] = pa.list_(pa.int64() if key.endswith('/count') else pa.float64())
