@@ -1,6 +1,7 @@
 """~/impacts: a status for each impact while somebody listens, and what /diagnostics tells."""
 import math
 
+import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
@@ -8,9 +9,11 @@ pytest.importorskip('numba')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.parameter import Parameter
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ragdoll_ros import load_limits, load_scene
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.ros.impacts.markers import to_arrows
 
 IMPACTS = '/ragdoll/impacts'
 TICKS = 40
@@ -70,6 +73,38 @@ def test_impacts_are_published_while_subscribed(make_node, peer):
             worst[impact.region] = max(worst.get(impact.region, 0), impact.ratio)
     told = (pair.split() for pair in node._impacts.status.split(', '))
     assert {region: float(ratio) for region, ratio in told} == pytest.approx(worst, rel=0.01)
+
+
+def test_markers_of_impacts_are_arrows_with_their_ratio(make_node, peer):
+    """Also without a subscriber to ~/impacts."""
+    node = make_node(impact_marker_lifetime=1.5)
+    heard = peer.collect(MarkerArray, IMPACTS + '/markers')
+    peer.wait_heard(node, IMPACTS + '/markers')
+    for _ in range(TICKS):
+        node.tick()
+    expected = alone()
+    peer.wait(lambda: len(heard) >= len(expected))
+    ids = []
+    for (_, message), impacts in zip(heard, expected, strict=True):
+        arrows = [marker for marker in message.markers if marker.type == Marker.ARROW]
+        texts = [marker for marker in message.markers if marker.type == Marker.TEXT_VIEW_FACING]
+        assert len(message.markers) == 2 * len(impacts)
+        for arrow, text, impact in zip(arrows, texts, impacts, strict=True):
+            assert arrow.header.frame_id == 'world' and arrow.id == text.id
+            assert arrow.lifetime.sec == 1 and arrow.lifetime.nanosec == 500_000_000
+            tail, tip = (np.array((point.x, point.y, point.z)) for point in arrow.points)
+            assert tuple(tail) == impact.point
+            along = tip - tail
+            np.testing.assert_allclose(along / np.linalg.norm(along), impact.normal, atol=1e-12)
+            assert f'{impact.peak_force:.0f} N' in text.text
+            assert f'{impact.ratio:.2f} of the limit' in text.text
+            assert (arrow.color.r > 0.8) == (impact.ratio > 1)
+            ids.append(arrow.id)
+        assert [arrow.is_above for arrow in to_arrows(message)] == [
+            impact.ratio > 1 for impact in impacts]
+    assert len(set(ids)) == len(ids)
+    longest = max(impact.ratio for impacts in expected for impact in impacts)
+    assert longest > 1, 'both colours were seen'
 
 
 def test_limits_are_replaced_by_a_path(make_node, peer, tmp_path):

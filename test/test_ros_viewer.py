@@ -193,6 +193,20 @@ def test_listens_to_what_is_shown_alone(node, remote, peer):
     peer.wait(lambda: listened() == [])
 
 
+def test_impacts_are_seen_for_a_second(no_node, nodes, remote, peer):
+    pytest.importorskip('numba')
+    nodes.append(start('node', compiled=True))
+    remote.request(RequestedData(frames=True, impacts=True))
+    seen(remote)
+    peer.wait(lambda: peer.count_subscribers('ragdoll/impacts/markers'))
+    assert peer.call(Trigger, 'ragdoll/reset', Trigger.Request()).success
+    wait(lambda: remote.frame.impacts)
+    arrow = remote.frame.impacts[0]
+    assert 'of the limit' in arrow.text and 0.09 < arrow.length < 1.01
+    assert remote.frame.time < 1.5, 'the doll falls in .3 s'
+    end(nodes[-1], signal.SIGINT)
+
+
 def test_a_node_that_is_paused_is_seen_as_it_stands(node, remote, peer):
     """It publishes nothing: the last poses are kept for who comes late."""
     remote.request(OPEN)

@@ -457,6 +457,21 @@ def test_contacts_on_demand(page):
     wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)
 
 
+def test_impacts_on_demand(page):
+    client = page.open()
+    wait(lambda: page.frame)
+    client.update(page.display.impacts, True)
+    wait(lambda: page.source.status.measures)
+    page.source.reset()
+    wait(lambda: page.frame.impacts)
+    assert all('of the limit' in arrow.text for arrow in page.frame.impacts)
+    labels = wait_for(page, '/scene/impacts_labels/0')
+    assert labels.text in {arrow.text for arrow in page.frame.impacts}
+    client.update(page.display.impacts, False)
+    wait(lambda: page.server.scene.get_handle_by_name('/scene/impacts_labels/0') is None)
+    wait(lambda: not page.source.frame.impacts)
+
+
 def test_who_looks_back_sees_contacts_of_the_time_before_they_were_shown(page):
     client = page.open()
     wait(lambda: page.frame and page.frame.time > 2)

@@ -27,6 +27,7 @@ from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
 from ragdoll_ros.model.static_body import StaticBody
 from ragdoll_ros.physics.engine.protocol import GROUND
+from ragdoll_ros.physics.sensors.impact_arrow import ImpactArrow
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Rods
 from ragdoll_ros.viewer.drawing import framing
@@ -37,6 +38,7 @@ from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, SEGMENTS
 from ragdoll_ros.viewer.drawing.overlays import (
     LABEL_GAP,
     MOST_LABELS,
+    Overlays,
     apart,
     arrow_to_surface,
     force_arrows,
@@ -44,6 +46,7 @@ from ragdoll_ros.viewer.drawing.overlays import (
 from ragdoll_ros.viewer.drawing.skin_meshes import SkinMeshes
 from ragdoll_ros.viewer.drawing.stage import CELL, FADE, draw_static_bodies, grid_size
 from ragdoll_ros.viewer.pointer import nearest_bone, target_at_distance, to_bone_frame
+from ragdoll_ros.viewer.sources.recent_impacts import RecentImpacts
 from ragdoll_ros.viewer.sources.source import Frame
 
 CORNERS = SEGMENTS / 2 * np.sin(2 * np.pi / SEGMENTS)
@@ -391,6 +394,31 @@ def test_the_ground_is_below_all_dolls_seen_from_home(name):
     apart = 300 / np.tan(0.4) * eye[2] * cell / (reach / 2) ** 2
     assert apart > 1.5
     assert (cell, reach) == (CELL, FADE) or name != 'drop'
+
+
+def test_impacts_are_arrows_with_their_ratio_for_a_second():
+    import viser
+    hit = ImpactArrow((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), '280 N, 2.00 of the limit', True)
+    tap = ImpactArrow((1.0, 0.0, 0.0), (1.0, 0.0, 0.1), '14 N, 0.10 of the limit', False)
+    scene, recent = load_scene('drop'), RecentImpacts()
+    assert recent.add(0, 1.0, (hit,)) == recent.add(0, 1.0, (hit,)) == (hit,)
+    assert recent.add(0, 1.5, (tap,)) == (hit, tap)
+    assert recent.add(0, 2.1, ()) == (tap,)
+    assert recent.add(1, 2.2, ()) == ()
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    overlays = Overlays(server)
+    with Simulation(scene) as simulation:
+        state = simulation.state
+    overlays.show(Frame(scene, 0.0, state, impacts=(tap, hit)))
+    for kind, arrow in (('impacts', tap), ('impacts_above', hit)):
+        points = server.scene.get_handle_by_name(f'/scene/{kind}').points
+        np.testing.assert_allclose(points, [(arrow.tail, arrow.tip)], atol=1e-6)
+    labels = [server.scene.get_handle_by_name(f'/scene/impacts_labels/{k}') for k in range(2)]
+    assert [label.text for label in labels] == [hit.text, tap.text]
+    overlays.show(Frame(scene, 0.0, state))
+    assert not server.scene.get_handle_by_name('/scene/impacts').visible
+    assert server.scene.get_handle_by_name('/scene/impacts_labels/0') is None
+    server.stop()
 
 
 def test_a_plane_is_drawn_from_above_alone():

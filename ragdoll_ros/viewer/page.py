@@ -69,8 +69,8 @@ class Page:
         self._live: Frame | None = None
         self._messages: tuple[str, ...] = ()
         """A problem, or '', and notes that are shown."""
-        self._has_contacts = False
-        """Whether contacts are drawn."""
+        self._drawn_data = RequestedData()
+        """What is drawn of the frame beside its bones."""
         self._next_look = 0.0
         self._folder = folder
         configure_lights(server)
@@ -175,9 +175,9 @@ class Page:
         self.plots.show(self.timeline.shown_instant(now), now)
         frame = self.timeline.frame_to_show(live, now)
         looks = now >= self._next_look
-        has_contacts = self.display.contacts.value
-        if frame is not self.frame or has_contacts != self._has_contacts:
-            self._has_contacts = has_contacts
+        drawn_data = self.display.requested
+        if frame is not self.frame or drawn_data != self._drawn_data:
+            self._drawn_data = drawn_data
             self._draw(frame)
             if self.timeline.is_live:
                 self.cameras.show(frame)
@@ -220,8 +220,10 @@ class Page:
             self.display.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
         self.frame = frame
-        if not self._has_contacts and frame.contacts is not None:
+        if not self._drawn_data.contacts and frame.contacts is not None:
             frame = replace(frame, contacts=None, forces=None, pairs=None)
+        if not self._drawn_data.impacts and frame.impacts:
+            frame = replace(frame, impacts=())
         self.stage.show(frame)
 
     def _edit(self, scene: Scene) -> None:

@@ -1,13 +1,15 @@
-"""Publisher of ~/impacts, and of the worst impacts for /diagnostics."""
+"""Publisher of ~/impacts and ~/impacts/markers, and of the worst impacts for /diagnostics."""
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
+from visualization_msgs.msg import MarkerArray
 
 from ...files.limits import load_limits
 from ...model.errors import RagdollError
+from .markers import to_impact_markers
 from .messages import to_impacts
 
 if TYPE_CHECKING:
@@ -19,11 +21,13 @@ DEPTH = 100
 
 
 class ImpactPublisher:
-    """Has impacts recorded while ~/impacts is subscribed, and publishes those of each tick."""
+    """Has impacts recorded while a topic is subscribed, and publishes those of each tick."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher = node.create_publisher(DiagnosticArray, '~/impacts', DEPTH)
+        self._markers = node.create_publisher(MarkerArray, '~/impacts/markers', DEPTH)
+        self._marker_count = 0
         self._limits_name = ''
         self._recorded: Simulation | None = None
         """The simulation whose impacts are recorded."""
@@ -35,7 +39,7 @@ class ImpactPublisher:
 
     def configure(self, settings: NodeSettings) -> None:
         """Take frame and limits of these settings."""
-        self._frame = settings.frame_id
+        self._frame, self._lifetime = settings.frame_id, settings.impact_marker_lifetime
         if settings.impact_limits != self._limits_name:
             self._limits_name = settings.impact_limits
             self._limits = load_limits(self._limits_name)
@@ -50,7 +54,8 @@ class ImpactPublisher:
 
     def start(self, simulation: Simulation) -> None:
         """Before a tick: begin or end the recording as there are subscribers or none."""
-        if not self._publisher.get_subscription_count():
+        if not (self._publisher.get_subscription_count()
+                or self._markers.get_subscription_count()):
             if self._recorded is not None or self._refused is not None:
                 self.stop()
         elif simulation not in (self._recorded, self._refused):
@@ -70,7 +75,12 @@ class ImpactPublisher:
         impacts = simulation.impacts
         if not impacts:
             return
-        self._publisher.publish(to_impacts(self._frame, stamp, impacts, self._limits))
+        if self._publisher.get_subscription_count():
+            self._publisher.publish(to_impacts(self._frame, stamp, impacts, self._limits))
+        if self._markers.get_subscription_count():
+            self._markers.publish(to_impact_markers(self._frame, stamp, impacts, self._marker_count,
+                                                    self._lifetime))
+        self._marker_count += len(impacts)
         for impact in impacts:
             if impact.region:
                 self._worst[impact.region] = max(self._worst.get(impact.region, 0.0), impact.ratio)
@@ -82,6 +92,6 @@ class ImpactPublisher:
             return (f'the engine {self._refused.engine_name} finds no times of impact, so that '
                     'there are none; the engine rigid does')
         if self._recorded is None:
-            return 'not recorded: nobody subscribes to ~/impacts'
+            return 'not recorded: nobody subscribes to ~/impacts or its markers'
         worst = sorted(self._worst.items(), key=lambda item: -item[1])
         return ', '.join(f'{region} {ratio:.3g}' for region, ratio in worst) or 'none'

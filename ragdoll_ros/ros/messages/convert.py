@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from builtin_interfaces.msg import Time
+from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Pose, PoseArray, Transform, Twist, Vector3
 from sensor_msgs.msg import Imu, JointState, MultiDOFJointState
 from std_msgs.msg import Header
@@ -52,6 +52,12 @@ def to_time(nanoseconds: int) -> Time:
     """Time from ns."""
     seconds, nanoseconds = divmod(nanoseconds, 1_000_000_000)
     return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def to_duration(nanoseconds: int) -> Duration:
+    """Duration from ns."""
+    seconds, nanoseconds = divmod(nanoseconds, 1_000_000_000)
+    return Duration(sec=seconds, nanosec=nanoseconds)
 
 
 def to_header(stamp: int, frame: str) -> Header:

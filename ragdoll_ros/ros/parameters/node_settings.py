@@ -77,6 +77,8 @@ class NodeSettings:
     impact_limits: str = _parameter(
         DEFAULT_LIMITS, 'Limits to which ~/impacts compares: a name in config/limits/ or a path',
         constraints='a file or the name of a shipped one')
+    impact_marker_lifetime: float = _parameter(
+        2.0, 'Time for which RViz shows a marker of ~/impacts/markers, s', (0.01, 3600.0))
     imus: tuple[str, ...] = _parameter(
         ('',), 'Bones with an inertial sensor, each published on ~/imu/<bone>/data_raw: '
         "'bone', 'bone x y z' (m from its centre of mass, bone frame) or "

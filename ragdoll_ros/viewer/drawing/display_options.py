@@ -27,6 +27,10 @@ class DisplayOptions:
             self.contacts = server.gui.add_checkbox(
                 'Contacts', initial_value=False, hint='Contact points and normal forces as arrows: '
                 '1 m is the weight of the first doll; a node publishes points without forces')
+            self.impacts = server.gui.add_checkbox(
+                'Impacts', initial_value=False, hint='For a second after each impact an arrow '
+                'along its impulse, with the peak force and its ratio to the limit of the body '
+                'region; engine rigid')
             self.limits = server.gui.add_checkbox(
                 'Joint limits', initial_value=False,
                 hint="An arc for a joint's range; its needle is red at the limits")
@@ -52,4 +56,4 @@ class DisplayOptions:
     @property
     def requested(self) -> RequestedData:
         """Data that a source must provide while a page is open."""
-        return RequestedData(True, self.contacts.value, self.limits.value)
+        return RequestedData(True, self.contacts.value, self.limits.value, self.impacts.value)

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import viser
@@ -25,6 +25,9 @@ LABEL_GAP = 0.15
 """m: a force whose tip is nearer to that of a stronger one has no label, which would lie on it."""
 
 BROWN, RED, BLUE, ORANGE = (90, 50, 25), (230, 50, 25), (30, 110, 230), (235, 110, 0)
+PURPLE, CRIMSON = (140, 64, 204), (217, 13, 64)
+"""Of impacts within their limit, and above it."""
+
 ROD_THICKNESS = 0.012
 """m: of a swing's rods."""
 
@@ -49,10 +52,14 @@ class Overlays:
             'contacts': lambda name, points: add.add_point_cloud(
                 name, points, ORANGE, point_size=0.02, point_shape='circle'),
             'forces': lambda name, points: add.add_arrows(
-                name, points, ORANGE, shaft_radius=0.01, head_radius=0.03, head_length=0.07)}
+                name, points, ORANGE, shaft_radius=0.01, head_radius=0.03, head_length=0.07),
+            'impacts': lambda name, points: add.add_arrows(
+                name, points, PURPLE, shaft_radius=0.01, head_radius=0.03, head_length=0.07),
+            'impacts_above': lambda name, points: add.add_arrows(
+                name, points, CRIMSON, shaft_radius=0.01, head_radius=0.03, head_length=0.07)}
         self._scene = server.scene
-        self._labels: list[viser.LabelHandle] = []
-        """Of forces, N."""
+        self._labels: dict[str, list[viser.LabelHandle]] = {'newtons': [], 'impacts': []}
+        """At the tips of arrows of forces and of impacts."""
         self._handles: dict[str, viser.SceneNodeHandle] = {}
         self._pushes: tuple[Push, ...] = ()
         self._last_push = 0.0
@@ -74,21 +81,26 @@ class Overlays:
         self._set('contacts', frame.contacts)
         arrows, newtons = force_arrows(frame)
         self._set('forces', arrows)
-        labelled = apart(arrows[:, 1])
-        self._label(arrows[labelled], newtons[labelled])
+        self._label('newtons', arrows[:, 1], [f'{force:.0f} N' for force in newtons])
+        impacts = sorted(frame.impacts, key=lambda arrow: -arrow.length)[:MOST_ARROWS]
+        for kind, is_above in (('impacts', False), ('impacts_above', True)):
+            self._set(kind, [(arrow.tail, arrow.tip) for arrow in impacts
+                             if arrow.is_above == is_above])
+        self._label('impacts', np.array([arrow.tip for arrow in impacts]).reshape(-1, 3),
+                    [arrow.text for arrow in impacts])
 
-    def _label(self, arrows: np.ndarray, newtons: np.ndarray) -> None:
-        """Write the forces at the tips of their arrows (k, 2, 3) m."""
-        while len(self._labels) > len(arrows):
-            self._labels.pop().remove()
-        for index, (arrow, force) in enumerate(zip(arrows, newtons, strict=False)):
-            text = f'{force:.0f} N'
-            if index == len(self._labels):
-                self._labels.append(self._scene.add_label(
-                    f'/scene/newtons/{index}', text, position=arrow[1], anchor='bottom-center'))
+    def _label(self, kind: str, tips: np.ndarray, texts: Sequence[str]) -> None:
+        """Write the texts at the tips (k, 3) m of arrows that are apart, the first ones first."""
+        labels, labelled = self._labels[kind], apart(tips)
+        while len(labels) > len(labelled):
+            labels.pop().remove()
+        for index, number in enumerate(labelled):
+            text, tip = texts[number], tips[number]
+            if index == len(labels):
+                labels.append(self._scene.add_label(
+                    f'/scene/{kind}_labels/{index}', text, position=tip, anchor='bottom-center'))
             else:
-                label = self._labels[index]
-                label.text, label.position = text, arrow[1]
+                labels[index].text, labels[index].position = text, tip
 
     def _set(self, kind: str, points: object) -> None:
         handle = self._handles.get(kind)

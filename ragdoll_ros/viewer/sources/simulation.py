@@ -13,6 +13,7 @@ from concurrent.futures import Future
 
 import numpy as np
 
+from ...files.limits import load_limits
 from ...files.scene import load_scene
 from ...model import errors
 from ...model.push import Push
@@ -20,8 +21,10 @@ from ...model.rotation import IDENTITY
 from ...model.scene import SECOND, Scene
 from ...model.vectors import Vector
 from ...physics.actions.grab import DRAG_TIME
+from ...physics.sensors.impact_arrow import impact_arrow
 from ...physics.simulation import Simulation
 from ...realtime.pacer import Pacer
+from .recent_impacts import RecentImpacts
 from .source import REAL_TIME_FACTORS, Frame, GrabbedPoint, RequestedData, Source, SourceStatus
 
 WINDOW = 1.0
@@ -62,6 +65,9 @@ class SimulationSource(Source):
         self._new_frames: deque[Frame] = deque(maxlen=MAX_NEW_FRAMES)
         self._runs = 0
         """Number of runs of the simulations before this one."""
+        self._impacts = RecentImpacts()
+        self._recorded: Simulation | None = None
+        """The simulation whose impacts are recorded."""
         self._pushed_bone = ''
         self._statistics = TickStatistics()
         self._simulation = Simulation(scene, engine=engine, workers='auto')
@@ -186,6 +192,7 @@ class SimulationSource(Source):
 
     def _set_requested(self, requested: RequestedData) -> None:
         was_running, self._requested = self._is_running, requested
+        self._record_impacts()
         if not was_running:
             self._restart_clock()
 
@@ -224,11 +231,22 @@ class SimulationSource(Source):
         self._runs += self._simulation.reset_count
         self._simulation.close()
         self._simulation = simulation
+        self._record_impacts()
         # The measures of the last simulation do not hold for this one.
         self._next_status = self._next_measure = 0.0
         self._update_status(real_time_factor=factor, problem='', engine=engine,
                             engine_name=simulation.engine_name)
         self._update_frame()
+
+    def _record_impacts(self) -> None:
+        """Begin or end the recording of impacts as requested; there is none in some engines."""
+        wanted = self._simulation if self._requested.impacts else None
+        if wanted is self._recorded:
+            return
+        self._recorded = None
+        with contextlib.suppress(errors.RagdollError):
+            self._simulation.record_impacts(load_limits() if wanted else None)
+            self._recorded = wanted
 
     def _tick(self) -> None:
         """Advance by one tick; a state that is not finite is not shown and restarts the scene."""
@@ -250,6 +268,8 @@ class SimulationSource(Source):
         contacts = simulation.contacts if requested.contacts or (
             len(simulation.scene.bones) <= FEW_BONES) else None
         work = sum(simulation.work)
+        run = self._runs + simulation.reset_count
+        new = simulation.impacts if simulation is self._recorded else ()
         self._frame = Frame(
             simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,
             grabs=tuple(self._grabs()),
@@ -259,8 +279,8 @@ class SimulationSource(Source):
             forces=None if contacts is None else contacts.normals * contacts.forces[:, None],
             pairs=None if contacts is None else np.stack(
                 [contacts.a, contacts.b, contacts.bodies], axis=1),
-            run=self._runs + simulation.reset_count, energy=work + simulation.energy_excess,
-            work=work)
+            impacts=self._impacts.add(run, simulation.time / SECOND, map(impact_arrow, new)),
+            run=run, energy=work + simulation.energy_excess, work=work)
         self._new_frames.append(self._frame)
         if time.monotonic() >= self._next_status:
             self._next_status = time.monotonic() + STATUS_PERIOD

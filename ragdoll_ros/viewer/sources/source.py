@@ -16,6 +16,7 @@ from ...model.push import Push
 from ...model.scene import Scene
 from ...model.state import State
 from ...model.vectors import Vector
+from ...physics.sensors.impact_arrow import ImpactArrow
 from ...recordings.recording import Recording
 
 REAL_TIME_FACTORS = (0.001, 100.0)
@@ -51,6 +52,8 @@ class Frame:
     """(k,) rad: joint angles, in the order of Scene.angle_names."""
     forces: np.ndarray | None = None
     """(c, 3) N: normal force at each contact; a node does not publish them."""
+    impacts: tuple[ImpactArrow, ...] = ()
+    """Arrows of the impacts of the last second; none unless requested."""
     pairs: np.ndarray | None = None
     """(c, 3) a, b and bodies of Contacts; where forces are known."""
     run: int = 0
@@ -96,6 +99,7 @@ class RequestedData:
     """Whether any page is open."""
     contacts: bool = False
     angles: bool = False
+    impacts: bool = False
 
 
 class Source(Protocol):

@@ -16,12 +16,16 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
 
 from ....model.scene import SECOND, Scene
 from ....model.state import State
+from ....physics.sensors.impact_arrow import ImpactArrow
 from ....recordings.recording import Rods
+from ....ros.impacts.markers import to_arrows
 from ....ros.messages.measures import TickMeasures, deserialize_measures
 from ....ros.messages.serialized import deserialize_pose_array
+from ..recent_impacts import RecentImpacts
 from ..source import Frame, RequestedData
 from .hands import NodeHands
 from .pushes import ObservedPushes
@@ -58,13 +62,22 @@ def _angles(message: JointState, scene: Scene | None) -> tuple[int, np.ndarray]:
     return stamp.sec * SECOND + stamp.nanosec, np.array(message.position)
 
 
+def _impacts(message: MarkerArray, _: Scene | None) -> tuple[int, tuple[ImpactArrow, ...]]:
+    arrows = to_arrows(message)
+    if not arrows:
+        raise ValueError('no arrows')
+    stamp = message.markers[0].header.stamp
+    return stamp.sec * SECOND + stamp.nanosec, arrows
+
+
 TOPICS = {'poses': Topic(PoseArray, '{}/poses', lambda data, _: deserialize_pose_array(data),
                          LATCHED_QOS),
           'measures': Topic(DiagnosticArray, '{}/measures',
                             lambda data, _: deserialize_measures(data), LATCHED_QOS),
           'contacts': Topic(PoseArray, '{}/contacts', _positions),
           'swings': Topic(PoseArray, '{}/swings', _positions, LATCHED_QOS),
-          'angles': Topic(JointState, 'joint_states', _angles, raw=False)}
+          'angles': Topic(JointState, 'joint_states', _angles, raw=False),
+          'impacts': Topic(MarkerArray, '{}/impacts/markers', _impacts, raw=False)}
 """By content; {} stands for the node's name. The node publishes poses last."""
 
 
@@ -87,6 +100,9 @@ class NodeFrames:
         """Of each topic, the content that was used last."""
         self._pushes: ObservedPushes | None = None
         self._rods: Rods | None = None
+        self._impacts = RecentImpacts()
+        self._new_impacts: list[ImpactArrow] = []
+        """Since the newest frame: the node publishes them after the poses of their tick."""
         self._urdf = ''
         """Checksum of the scene's URDF."""
         self._frames: deque[Frame] = deque(maxlen=MAX_MESSAGES)
@@ -108,6 +124,7 @@ class NodeFrames:
         swings = self._rods is not None and self._rods.count > 0
         needed = {'poses': requested.frames, 'measures': requested.frames,
                   'contacts': requested.contacts, 'angles': requested.angles,
+                  'impacts': requested.impacts,
                   'swings': requested.frames and swings}
         kinds = {kind for kind in TOPICS if needed[kind]}
         with self._lock:
@@ -176,6 +193,9 @@ class NodeFrames:
             self._poses.append((stamp, value))
             self.last_poses = time.monotonic()
             return
+        if kind == 'impacts':
+            self._new_impacts += value
+            return
         values = self._values.setdefault(kind, {})
         values.pop(stamp, None)
         values[stamp] = value
@@ -220,10 +240,13 @@ class NodeFrames:
         masses, rods = self._latest.get('swings'), None
         if masses is not None and len(masses) == self._rods.count:
             rods = self._rods.ends(masses, state)
+        impacts = self._impacts.add(measures.run, self._pushes.time,
+                                    self._new_impacts)
+        self._new_impacts = []
         work = measures.work_of_pushes + measures.work_of_grabs
         self._frame = Frame(scene, self._pushes.time, state, self._pushes.pushes,
                             self._hands.grabs(scene, state), rods, self._latest.get('contacts'),
-                            self._latest.get('angles'), run=measures.run,
+                            self._latest.get('angles'), run=measures.run, impacts=impacts,
                             energy=work + measures.energy_excess, work=work)
         self._frames.append(self._frame)
 
