@@ -1,0 +1,221 @@
+"""Random worlds, reproducible: the default doll falls over bodies of all kinds; and what is bad."""
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ragdoll_ros import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ground,
+    HeightField,
+    Hull,
+    Mesh,
+    Placement,
+    Plane,
+    Scene,
+    Simulation,
+    Sphere,
+    StaticBody,
+    load_scene,
+)
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.scene import Material
+
+SECONDS = 3.0
+SPREAD = 1.2
+"""m: bodies are within so much of the doll, along x and y."""
+
+EXCESS = 1e-5
+"""Largest share of the energy of the fall that may come from nothing, as of the 10 008 starts."""
+
+DEEPEST = 1e-3
+"""m, as on the ground."""
+
+EVERY = 10
+"""Ticks from one look at depths to the next."""
+
+MATERIALS = [Material(friction, 0.0, restitution) for friction in (0.0, 0.3, 0.8, math.inf)
+             for restitution in (0.0, 0.3, 0.7)]
+
+
+def world(number: int) -> Scene:
+    """Random world ``number``."""
+    rng = np.random.default_rng([36, number])
+    floor = [_ground, _slope, _hills][rng.integers(3)]
+    ground, bodies = floor(rng)
+    makers = [_box, _box, _sphere, _cylinder, _capsule, _stone, _shell]
+    bodies += [_anywhere(rng, f'body_{k}', makers[rng.integers(len(makers))](rng))
+               for k in range(rng.integers(3, 16))]
+    if rng.random() < 0.4:
+        bodies += [_wall(rng, k) for k in range(rng.integers(1, 3))]
+    doll = load_scene('drop').dolls[0].doll
+    top = 1.6 + (0.8 if ground is None else 0.0)
+    placement = Placement(
+        doll, position=(0.0, 0.0, top + float(rng.uniform(0.0, 1.0))),
+        orientation=tuple(rotation.normalized(rng.normal(size=4))),
+        velocity=tuple(rng.normal(size=3)), spin=tuple(3 * rng.normal(size=3)))
+    return Scene(f'world_{number}', (placement,), ground, MATERIALS[rng.integers(len(MATERIALS))],
+                 bodies=tuple(bodies))
+
+
+def _ground(rng):
+    return Ground(), []
+
+
+def _slope(rng):
+    """Two planes: a gutter, or a roof where they turn away from each other."""
+    angles = rng.uniform(-0.4, 0.4, 2)
+    return None, [StaticBody(f'floor_{k}', Plane(), (0.0, 0.0, -0.3), tuple(
+        rotation.from_axis_angle((0.0, 1.0, 0.0) if k else (1.0, 0.0, 0.0), angle)))
+        for k, angle in enumerate(angles)]
+
+
+def _hills(rng):
+    heights = rng.uniform(-0.25, 0.25, (11, 13))
+    return None, [StaticBody('hills', HeightField(heights, (24.0, 20.0)), friction=0.5)]
+
+
+def _box(rng):
+    return Box(tuple(rng.uniform(0.05, 0.6, 3)))
+
+
+def _sphere(rng):
+    return Sphere(rng.uniform(0.05, 0.3))
+
+
+def _cylinder(rng):
+    return Cylinder(*rng.uniform(0.05, 0.3, 2))
+
+
+def _capsule(rng):
+    return Capsule(*rng.uniform(0.05, 0.3, 2))
+
+
+def _stone(rng):
+    """A hull of random points: their tetrahedron, which needs no library."""
+    points = rng.normal(size=(4, 3))
+    points *= 0.3 / np.abs(points).max()
+    faces = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    if np.dot(points[3] - points[0], np.cross(points[1] - points[0], points[2] - points[0])) > 0:
+        faces = faces[:, ::-1]
+    return Hull(points, faces)
+
+
+def _shell(rng):
+    """An open strip of triangles, bent at random."""
+    x = np.linspace(-0.4, 0.4, 5)
+    heights = rng.uniform(-0.12, 0.12, 5)
+    vertices = np.array([(a, b, h) for a, h in zip(x, heights, strict=True) for b in (-0.3, 0.3)])
+    faces = [f for k in range(0, 8, 2) for f in ((k, k + 2, k + 3), (k, k + 3, k + 1))]
+    return Mesh(vertices, faces)
+
+
+def _anywhere(rng, name, shape):
+    position = (*rng.uniform(-SPREAD, SPREAD, 2), rng.uniform(0.0, 0.7))
+    return StaticBody(name, shape, tuple(map(float, position)),
+                      tuple(rotation.normalized(rng.normal(size=4))))
+
+
+def _wall(rng, k):
+    """A plane that stands 1.4 m from the doll and leans a little."""
+    heading = rng.uniform(0, 2 * math.pi)
+    away = np.array((math.cos(heading), math.sin(heading), 0.0))
+    normal = rotation.normalized(-away + (0, 0, rng.uniform(-0.2, 0.4)))
+    turn = rotation.shortest_arc(np.array((0.0, 0.0, 1.0)), normal)
+    return StaticBody(f'wall_{k}', Plane(), tuple(map(float, 3.0 * away)), tuple(turn))
+
+
+@dataclasses.dataclass(frozen=True)
+class Figures:
+    """What a fall in a world shows."""
+
+    excess: float
+    """Energy from nothing over that of the fall, infinite if a state was not finite."""
+    depth: float
+    """m: deepest that a bone was in a body or in the ground."""
+    where: str
+    """In what, and when."""
+    overlaps: bool
+    """Whether the doll begins in something: such a world is none."""
+
+    @property
+    def is_bad(self) -> bool:
+        """Whether energy came from nothing, or something was passed."""
+        return not self.overlaps and not (self.excess <= EXCESS and self.depth <= DEEPEST)
+
+
+def fall(number: int, accuracy: str = 'normal') -> Figures:
+    """The fall in world ``number``."""
+    scene = world(number)
+    deepest, where = 0.0, ''
+    with Simulation(scene, accuracy=accuracy, engine='rigid') as simulation:
+        overlaps = bool(simulation.initial_overlaps)
+        for tick in range(round(SECONDS / scene.step)):
+            state = simulation.advance()
+            if not np.isfinite(state.rows).all():
+                return Figures(math.inf, deepest, where, overlaps)
+            if tick % EVERY == 0:
+                depth, body = deepest_in_bodies(scene, state)
+                if depth > deepest:
+                    deepest, where = depth, f'{body} at {tick / 100:.2f} s'
+        excess = simulation.measures()['energy_excess_J']
+    own = scene.dolls[0].doll.mass * 9.8 * scene.dolls[0].position[2]
+    return Figures(excess / own, deepest, where, overlaps)
+
+
+def deepest_in_bodies(scene: Scene, state) -> tuple[float, str]:
+    """Largest depth, m, of a point of a bone's surface in a body, or of a body's in a bone."""
+    deepest, where = 0.0, ''
+    parts = [(part, position + rotation.rotate(turn, np.array(part.position)),
+              rotation.multiply(turn, np.array(part.orientation)))
+             for bone, position, turn in zip(scene.bones, state.positions, state.orientations,
+                                             strict=True) for part in bone.shape.parts]
+    points = np.concatenate([place + rotation.rotate(turn, part.shape.mesh()[0])
+                             for part, place, turn in parts])
+    for body in scene.bodies:
+        depth = float(-distance(body, points).min())
+        if not isinstance(body.shape, Plane):
+            corners = body.pose.apply(body.shape.mesh()[0])
+            # Vertices within a bone; an open surface is on no side of it.
+            for part, place, turn in parts:
+                local = rotation.rotate(rotation.inverse(turn), corners - place)
+                depth = max(depth, float(-part.shape.signed_distance(local).min()))
+        if depth > deepest:
+            deepest, where = depth, body.name
+    if scene.ground is not None:
+        depth = float(scene.ground.offset - (points @ np.array(scene.ground.normal)).min())
+        deepest, where = max((deepest, where), (depth, 'ground'))
+    return deepest, where
+
+
+def distance(body: StaticBody, points: np.ndarray) -> np.ndarray:
+    """Signed distance (p,) m, of points (p, 3), or of those inside a bound of it."""
+    local = body.pose.apply_inverse(points)
+    if isinstance(body.shape, Plane):
+        return local[:, 2]
+    if isinstance(body.shape, HeightField):
+        return _above(body.shape, local)
+    if isinstance(body.shape, Hull):
+        triangles = body.shape.triangles
+        return (np.einsum('pi,ti->pt', local, triangles.normals) - np.einsum(
+            'ti,ti->t', triangles.corners[:, 0], triangles.normals)).max(axis=1)
+    if isinstance(body.shape, Mesh):
+        return np.full(len(points), np.inf)
+    return body.shape.signed_distance(local)
+
+
+def _above(field: HeightField, points: np.ndarray) -> np.ndarray:
+    """Heights (p,) m of points over the triangles of a height field."""
+    rows, columns = field.heights.shape
+    x = (points[:, 0] / field.size[0] + 0.5) * (columns - 1)
+    y = (points[:, 1] / field.size[1] + 0.5) * (rows - 1)
+    i, j = (np.clip(np.floor(value).astype(int), 0, most - 2)
+            for value, most in ((x, columns), (y, rows)))
+    u, v, h = x - i, y - j, field.heights
+    a, b, c, d = h[j, i], h[j, i + 1], h[j + 1, i + 1], h[j + 1, i]
+    low = np.where(u >= v, a + u * (b - a) + v * (c - b), a + v * (d - a) + u * (c - d))
+    return points[:, 2] - low
