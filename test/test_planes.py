@@ -13,6 +13,7 @@ from ragdoll_ros import (
     Capsule,
     Cylinder,
     Ground,
+    HeightField,
     Plane,
     RagdollError,
     Simulation,
@@ -192,3 +193,22 @@ def test_what_a_plane_has_not_is_refused(tmp_path, entry, told):
     path.write_text(f'dolls: [{{doll: doll}}]\nbodies:\n  - {{name: it, shape: {entry}}}\n')
     with pytest.raises(RagdollError, match=told):
         load_scene(str(path))
+
+
+def test_volumes_around_planes_and_surfaces_are_found():
+    """By simulation_interfaces: a box or sphere above a slope overlaps it or does not."""
+    pytest.importorskip('rclpy')
+    from ragdoll_ros.ros.simulation_interfaces.bounds import Kind, Volume, bounding_box
+    floor, slope = plane(), facing('slope', (0.6, 0.0, 0.8))
+    hill = StaticBody('hill', HeightField([[0, 0.5], [0, 0.5]], (2, 2)), position=(0, 0, 1))
+    low, high = bounding_box([(hill.shape, hill.pose)])
+    assert (*low, *high) == pytest.approx((-1, -1, 1, 1, 1, 1.5))
+    assert bounding_box([(floor.shape, floor.pose)])[1].tolist() == [np.inf, np.inf, 0.0]
+    for kind, points, found in (
+            (Kind.BOX, ((-1, -1, 0.1), (1, 1, 2)), (False, True, True)),
+            (Kind.BOX, ((-1, -1, -0.1), (1, 1, 0.9)), (True, True, False)),
+            (Kind.SPHERE, ((0, 0, 0.5), (0.45, 0, 0)), (False, True, False)),
+            (Kind.SPHERE, ((1, 0, 2), (0.9, 0, 0)), (False, False, True))):
+        volume = Volume.of(kind, points)
+        assert tuple(volume.overlaps(body.shape, body.pose)
+                     for body in (floor, slope, hill)) == found, (kind, points)

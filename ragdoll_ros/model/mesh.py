@@ -50,6 +50,19 @@ class Surface:
         """Vertices (v, 3) m and triangles (t, 3)."""
         raise NotImplementedError
 
+    def support(self, direction: np.ndarray) -> np.ndarray:
+        """Support function (...,) m along unit directions (..., 3), in its own axes."""
+        return (np.asarray(direction, float) @ self.mesh()[0].T).max(axis=-1)
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        """Distance (p,) m of points (p, 3) from its bounding box, negative inside: at most that
+        from its surface.
+        """
+        vertices, _ = self.mesh()
+        lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+        beyond = np.maximum(lower - points, points - upper)
+        return np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+
     @functools.cached_property
     def triangles(self) -> Triangles:
         """Its triangles, in its own axes; those without a normal are left out."""

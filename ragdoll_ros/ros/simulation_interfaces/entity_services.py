@@ -4,6 +4,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from ...model.drive import MAX_SPEED
 from ...model.ragdoll import WORLD
 from ...model.scene import Scene
@@ -105,9 +107,11 @@ class EntityServices:
                                             tuple(info.tags)))
 
     def _get_entity_bounds(self, request: Any, response: Any) -> None:
-        """The upper corner comes first."""
+        """The upper corner comes first; what has no end, as a plane, has no bounds."""
         simulation, entity = self._controlled.simulation, self.entities.find(request.entity)
         lower, upper = own_box(entity, simulation.scene, simulation.state)
+        if not np.isfinite((lower, upper)).all():
+            return
         response.bounds.type = int(Kind.BOX)
         response.bounds.points = [to_vector(upper), to_vector(lower)]
 
