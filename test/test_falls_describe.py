@@ -55,6 +55,11 @@ def test_page_says_what_the_falls_say(thrown, folder, capsys):
         assert int(row[1]) == round(100 * len(speeds) / COUNT)
         if len(speeds):
             assert row[2] == f'{speeds.mean():.2f} ± {speeds.std():.2f}'
+    chest = [fall.worst_impacts.by_region['chest'] for fall in falls]
+    forces = np.array([impact.peak_force for impact in chest if impact])
+    row = re.search(r'\| chest \| (\d+)% \| (.*?) \|', page)
+    assert int(row[1]) == round(100 * len(forces) / COUNT) > 0
+    assert row[2] == f'{forces.mean():.0f} ± {forces.std():.0f}'
     from matplotlib import pyplot
     for name in re.findall(r'!\[.*?\]\((.*?)\)', page):
         pixels = pyplot.imread(folder / name)

@@ -1,5 +1,5 @@
 """Summary of a data set, from its labels."""
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,14 @@ class DatasetSummary:
     impact_speeds: np.ndarray
     """(f, n) m/s downwards, of each bone before its first contact."""
     failures: dict[int, str]
+    regions: list[str] = field(default_factory=list)
+    """The r regions of the body that have limits."""
+    peak_forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    """(f, r) N, of the impact that is nearest to the region's limit."""
+    ratios: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    """(f, r) of these to the limits."""
+    hic15: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """(f,) s g^2.5, of the head."""
 
     @property
     def hits(self) -> np.ndarray:
@@ -75,12 +83,15 @@ def summarize(folder: Path) -> DatasetSummary:
         raise WrongForm('falls', manifest.done, f'all {manifest.header["count"]}: ragdoll_falls '
                         '... --resume makes the rest')
     recipe = recipe_of(manifest.header['recipe'])
-    labels = resolve_format('lerobot').read_labels(folder)
+    lerobot = resolve_format('lerobot')
+    labels = lerobot.read_labels(folder)
     onsets, impacts, rests, impact_times = (
         labels[key] / recipe.rate for key in ('onset', 'impact', 'rest', 'impact_frames'))
     return DatasetSummary(
         recipe, [bone.name for bone in recipe.dolls[0].bones], onsets, impacts, rests,
-        labels['direction_deg'], impact_times, labels['impact_speeds'], manifest.failures)
+        labels['direction_deg'], impact_times, labels['impact_speeds'], manifest.failures,
+        lerobot.read_regions(folder), labels['region_peak_forces_N'], labels['region_ratios'],
+        labels['hic15'])
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

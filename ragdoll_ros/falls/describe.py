@@ -56,7 +56,8 @@ def page_text(summary: DatasetSummary, drawn: list[str]) -> str:
         "bone's centre of mass in the last frame before its first contact; of two hands, the one "
         'that touches first counts.', '', '## Bones that hit', '',
         '| bone | falls in which it hits | speed downwards, m/s |', '| --- | --- | --- |',
-        *_bones(summary), '', *(f'![{Path(name).stem}]({name})\n' for name in drawn)]
+        *_bones(summary), '', *_impacts(summary),
+        *(f'![{Path(name).stem}]({name})\n' for name in drawn)]
     if summary.failures:
         lines += ['', '## Failed', '', *(f'- fall {number}: {reason}' for number, reason
                                          in summary.failures.items())]
@@ -89,5 +90,26 @@ def _bones(summary: DatasetSummary) -> list[str]:
             if name not in summary.recipe.data['feet']]
 
 
-def _spread(values: np.ndarray) -> str:
-    return f'{values.mean():.2f} ± {values.std():.2f}' if len(values) else 'none'
+def _impacts(summary: DatasetSummary) -> list[str]:
+    """How hard regions of the body are hit; nothing where the bones have none."""
+    if not summary.regions:
+        return []
+    rows = [f'| {name} | {np.isfinite(ratios).mean():.0%} | {_spread(_known(forces), 0)} | '
+            f'{_spread(_known(ratios), 1)} |' for name, forces, ratios in zip(
+                summary.regions, summary.peak_forces.T, summary.ratios.T, strict=True)]
+    return ['## Impacts', '', '| region | falls in which it hits | peak force, N | ratio to its '
+            'limit |', '| --- | --- | --- | --- |', *rows, '',
+            f'HIC15 of the head: {_spread(_known(summary.hic15), 0)}.', '',
+            'Of each fall the impact that is nearest to the limit. Forces are those of a stated '
+            'contact law, limits those of pain from contact with robots (ISO/TS 15066): see '
+            'docs/falls.md of ragdoll_ros.', '']
+
+
+def _known(values: np.ndarray) -> np.ndarray:
+    return values[np.isfinite(values)]
+
+
+def _spread(values: np.ndarray, digits: int = 2) -> str:
+    if not len(values):
+        return 'none'
+    return f'{values.mean():.{digits}f} ± {values.std():.{digits}f}'

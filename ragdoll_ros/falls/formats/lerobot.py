@@ -28,7 +28,8 @@ DATA, EPISODES = f'data/{PLACE}', f'meta/episodes/{PLACE}'
 STATISTICS = ('min', 'max', 'mean', 'std', 'count')
 POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 VELOCITY = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz')
-LABELS = ('onset', 'impact', 'rest', 'direction_deg', 'impact_frames', 'impact_speeds')
+LABELS = ('onset', 'impact', 'rest', 'direction_deg', 'impact_frames', 'impact_speeds', 'hic15',
+          'region_peak_forces_N', 'region_ratios')
 
 
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
@@ -59,7 +60,8 @@ def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
 
 def read_labels(folder: Path) -> dict[str, np.ndarray]:
     """Labels of a data set's f falls: onset, impact and rest (f,) in frames, direction_deg (f,),
-    impact_frames (f, n) and impact_speeds (f, n) m/s; NaN where there is none.
+    impact_frames (f, n) and impact_speeds (f, n) m/s; hic15 (f,), region_peak_forces_N (f, r) and
+    region_ratios (f, r); NaN where there is none.
     """
     paths = sorted(folder.glob('meta/episodes/*/*.parquet'))
     if missing := set(LABELS) - set(parquet.read_schema(paths[0]).names):
@@ -67,6 +69,12 @@ def read_labels(folder: Path) -> dict[str, np.ndarray]:
                         'data set again')
     table = pa.concat_tables(parquet.read_table(path, columns=list(LABELS)) for path in paths)
     return {key: np.array(table.column(key).to_pylist(), float) for key in LABELS}
+
+
+def read_regions(folder: Path) -> list[str]:
+    """The r regions of the body in a data set's labels."""
+    path = min(folder.glob('meta/episodes/*/*.parquet'))
+    return parquet.read_table(path, columns=['regions']).slice(0, 1).to_pylist()[0]['regions']
 
 
 def _frames(recipe: Recipe, fall: Fall) -> pa.Table:

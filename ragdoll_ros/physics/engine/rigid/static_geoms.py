@@ -134,19 +134,21 @@ class StaticGeoms:
     def _find(self, states: np.ndarray, ahead: float, moving: np.ndarray) -> np.ndarray:
         """Pairs (k,) that may touch within ``ahead`` s, of ``moving`` dolls (d,), sorted."""
         chosen = moving[self._doll_of_bone]
-        planes = self._near_planes(states, ahead, chosen) if len(self._offsets) else NO_KEYS
         if self._tree is None:
-            return planes
+            return self._near_planes(states, ahead, chosen)
         count = aabb_tree.find_near(self._tree, states, self._reach, chosen, ahead, self._found)
         if count > len(self._found):
             self._found = np.zeros(2 * count, np.int64)
             return self._find(states, ahead, moving)
+        if not len(self._offsets):
+            return np.sort(self._found[:count])
         # The tree knows of the geoms before the planes alone.
         bones, geoms = np.divmod(self._found[:count], len(self.geoms) - len(self._offsets))
-        return np.sort(np.concatenate([bones * len(self.geoms) + geoms, planes]))
+        return np.sort(np.concatenate([bones * len(self.geoms) + geoms,
+                                       self._near_planes(states, ahead, chosen)]))
 
     def _near_planes(self, states: np.ndarray, ahead: float, chosen: np.ndarray) -> np.ndarray:
-        """Pairs (k,) of ``chosen`` bones (n,) and planes that may touch within ``ahead`` s."""
+        """Pairs (k,), sorted, of ``chosen`` bones (n,) with planes, as _find()."""
         speed = (np.linalg.norm(states[:, 7:10], axis=1)
                  + self._reach * np.linalg.norm(states[:, 10:13], axis=1))
         radius = self._reach + aabb_tree.MARGIN + aabb_tree.IMPACT_SPEEDUP * ahead * speed
