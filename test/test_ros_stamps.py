@@ -329,4 +329,23 @@ def test_after_stalls_no_stamp_lies_in_the_future(make_node, peer, rate):
     peer.wait(lambda: len(ahead) > 40)
     # What is due is never early by more than a timer's rounding.
     assert max(ahead) < 1e6
+
+
+@pytest.mark.parametrize('phase', [0.55, 0.66, 0.9])
+def test_a_timer_that_comes_late_makes_no_tick_early(make_node, peer, phase):
+    """After a stall the timer begins anew once the first tick is made, here so much of a period
+    late; then a tick takes a period and a half. Before, the last but one after it came early.
+    """
+    node, ahead = make_node(scene='flight', rate=100.0), []
+    make_tick, pauses = node._ticker._tick, {8: 0.53, 9: phase / 100, 14: 0.015}
+
+    def tick(due):
+        ahead.append(due - time.monotonic_ns())
+        make_tick(due)
+        time.sleep(pauses.get(len(ahead), 0.0))
+
+    node._ticker._tick = tick
+    peer.executor_.add_node(node)
+    peer.wait(lambda: len(ahead) > 24)
+    assert max(ahead) < 1e6
     assert node._ticker.dropped_ticks > 0

@@ -442,13 +442,13 @@ def test_contacts_on_demand(page):
     wait(lambda: page.frame)
     assert page.server.scene.get_handle_by_name('/scene/contacts') is None
     client.update(page.display.contacts, True)
-    wait(lambda: page.frame.contacts is not None and len(page.frame.contacts) > 3)
+    wait(lambda: page.source.frame is page.frame and page.frame.contacts is not None and
+         np.linalg.norm(page.frame.state.linear_velocities, axis=1).max() == 0)
     points = wait_for(page, '/scene/contacts').points
+    assert len(points) > 3
     # Bones of the doll touch each other as well, above the ground.
     assert points[:, 2].min() == pytest.approx(0, abs=0.01)
     # At rest the ground bears the weight: 1 m of lines in all.
-    wait(lambda: page.source.frame is page.frame and np.linalg.norm(
-        page.frame.state.linear_velocities, axis=1).max() == 0)
     lines = page.server.scene.get_handle_by_name('/scene/forces').points
     below = lines[:, 0, 2] < 0.01
     rises = (lines[below, 1, 2] - lines[below, 0, 2]).sum()

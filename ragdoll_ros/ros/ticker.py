@@ -73,7 +73,7 @@ class Ticker:
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
         self._pacer, self._running = Pacer(1.0, 0), False
-        self._ticks_per_wake, self._caught_up = 1, False
+        self._ticks_per_wake, self._last_made = 1, 0
         self._throttles = {interval: PollThrottle(interval)
                            for interval in (SERVICE_INTERVAL, QOS_EVENT_INTERVAL)}
         self._timer = node.create_timer(1.0, self._on_timer, clock=steady)
@@ -137,13 +137,11 @@ class Ticker:
             while not done.wait(pause):
                 begin = time.monotonic()
                 if self._running:
-                    self._caught_up = True
                     self._on_timer()
                 # As long as the ticks took: on a busy machine they would leave nothing to it.
                 pause = max(MIN_TIMER_PERIOD / 1e9, time.monotonic() - begin)
         finally:
             sys.setswitchinterval(interval)
-            self._caught_up = True  # the timer's next wake-up is a late one
         if failures:
             raise failures[0]
         return results[0]
@@ -160,17 +158,17 @@ class Ticker:
             throttle.wake(woken)
         end, dropped = woken + MAX_CALLBACK_TIME, self._pacer.dropped_time
         made, early = 0, 0.5
-        if self._caught_up:
-            # This wake-up may be a late one, whose tick the last one has made. The next one before
-            # it is due would have a stamp in the future, as would a second one.
+        if woken - self._last_made < self._timer.timer_period_ns - TIMER_ROUNDING:
+            # The last tick was late, and may have been this wake-up's: the next one before it is
+            # due would have a stamp in the future, as would a second one.
             early = min(early, TIMER_ROUNDING / self._pacer.period)
         while made < self._max_ticks:
             now = time.monotonic_ns()
             if now > end or not self._pacer.due(now, 0.0 if made else early):
                 break
+            self._last_made = now
             self._tick(self._pacer.last_due)
             made += 1
-        self._caught_up = made > self._ticks_per_wake
         if self._pacer.dropped_time != dropped:
             # Ticks are due in another phase now. The timer would come up to half a period before
             # them, and stamps would lie in the future.
