@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS, document
 
+from ragdoll_ros.files.gltf.gltf_file import GltfFile
+from ragdoll_ros.files.gltf.nodes import read_nodes
 from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.fit.reading.character import read_character
-from ragdoll_ros.fit.reading.gltf_file import GltfFile
-from ragdoll_ros.fit.reading.nodes import read_nodes
 
 RIG = RIGS['cmu']
 

@@ -99,3 +99,19 @@ def test_shortest_arc_turns_one_direction_into_the_other():
     for a, b in [((1, 0, 0), (0, 1, 0)), ((0, 0, 1), (0, 0, -1)), ((1, 2, 3), (-3, 1, 2))]:
         turned = rotation.rotate(rotation.shortest_arc(np.array(a), np.array(b)), a)
         assert rotation.normalized(turned) == pytest.approx(rotation.normalized(b), abs=1e-12)
+
+
+@pytest.mark.parametrize('stretch', [np.eye(3), np.diag((2.0, 0.5, 1.5)), np.diag((3.0, 1.0, -2.0))])
+def test_the_spin_of_the_nearest_rotation_is_its_derivative(stretch):
+    """Centred differences of rotations that turn while they are stretched along axes askew."""
+    askew = rodrigues((0.3, -0.2, 0.9))
+
+    def at(time):
+        growth = askew @ (stretch * (1 + 0.4 * time)) @ askew.T
+        return rodrigues(np.array((0.5, 1.0, -0.7)) * (1 + time)) @ growth
+
+    h = 1e-5
+    earlier, later = rotation.nearest_rotation(at(-h)), rotation.nearest_rotation(at(h))
+    turned = rotation.rotation_vector(rotation.multiply(later, rotation.inverse(earlier)))
+    spin = rotation.nearest_rotation_spin(at(0.0), (at(h) - at(-h)) / (2 * h))
+    assert spin == pytest.approx(turned / (2 * h), abs=1e-8)

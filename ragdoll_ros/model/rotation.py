@@ -122,6 +122,30 @@ def from_matrix(r: ArrayLike) -> np.ndarray:
     return np.where(q[..., 3:] >= 0, q, -q)
 
 
+def nearest_rotation(matrix: ArrayLike) -> np.ndarray:
+    """Quaternion (4,) of the rotation nearest to a matrix (3, 3) with scale or reflection."""
+    u, _, vt = np.linalg.svd(matrix)
+    if np.linalg.det(u @ vt) < 0:
+        u = u * (1.0, 1.0, -1.0)
+    return from_matrix(u @ vt)
+
+
+def nearest_rotation_spin(changed: ArrayLike, rate: ArrayLike) -> np.ndarray:
+    """Angular velocity (3,) of nearest_rotation() of a matrix A (3, 3), outer axes.
+
+    ``rate`` is dA/dt. With A = R P, P symmetric, and the spin w in the body's axes,
+    skew(R^T dA/dt - its transpose) = [w] P + P [w] = [(trace(P) - P) w]. Singular where the
+    nearest rotation is not unique.
+    """
+    r = matrix(nearest_rotation(changed))
+    stretch = r.T @ np.asarray(changed, float)
+    turned = r.T @ np.asarray(rate, float)
+    odd = turned - turned.T
+    body = np.linalg.solve(np.trace(stretch) * np.eye(3) - (stretch + stretch.T) / 2,
+                           (odd[2, 1], odd[0, 2], odd[1, 0]))
+    return r @ body
+
+
 def from_axis_angle(axis: ArrayLike, angle: float) -> np.ndarray:
     """Unit quaternion (4,) of a rotation by ``angle`` rad about ``axis``, right-handed."""
     sine, cosine = sine_and_cosine(angle / 2)

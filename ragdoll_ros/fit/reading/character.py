@@ -5,22 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ...files.doll import plain_name
+from ...files.gltf.bones import bone_names, names_of_nodes
+from ...files.gltf.gltf_file import GltfFile
+from ...files.gltf.nodes import TO_ROS, Nodes, read_nodes
 from ...model import errors, rotation
-from ...model.ragdoll import WORLD
 from ...model.skeleton import Appearance
 from ..roles.names import side_of
 from .draco import decompress
-from .gltf_file import GltfFile
 from .materials import Materials
-from .nodes import Nodes, read_nodes
 from .rigid_meshes import add_rigid_meshes
 from .scale import metres_per_unit
 from .skins import Skins, read_skins
 from .spring_bones import SpringBone, drop_short_segments, read_springs, with_points
-
-TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
-"""glTF has +Y up, +Z forward and +X left: its (z, x, y) is (x, y, z) here."""
 
 MAX_BONES = 1500
 """A detailed face has about 900."""
@@ -113,7 +109,7 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     bind_matrices = np.stack([skins.bind_matrices[node] for node in joints])
     if not np.isfinite(skins.vertices).all() or not np.isfinite(bind_matrices).all():
         raise errors.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
-    names = _bone_names([file.json['nodes'][node].get('name') for node in joints])
+    names = names_of_nodes(file, joints)
     notes = list(skins.notes)
     axes = TO_ROS
     positions, vertices = bind_matrices[:, :3, 3] @ axes.T, skins.vertices @ axes.T
@@ -130,10 +126,10 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
     springs = _springs(file, nodes, skins, place, metres * axes, notes)
     appearance = _read_appearance(file, skins, axes, notes)
-    stem = _bone_names([file.path.stem])[0]
+    stem = bone_names([file.path.stem])[0]
     return Character(
         stem, names, parents,
-        positions * metres, np.stack([_nearest_rotation(matrix) for matrix in linear]),
+        positions * metres, np.stack([rotation.nearest_rotation(matrix) for matrix in linear]),
         vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
         tuple(notes), springs, appearance)
 
@@ -166,7 +162,7 @@ def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
             spring, points=spring.points @ matrix.T, carrier=carrier,
             bones=tuple(place[node] for node in spring.nodes if node in place)), notes))
     found = [spring for spring in found if spring.joints]
-    names = _bone_names([spring.name for spring in found])
+    names = bone_names([spring.name for spring in found])
     return tuple(replace(spring, name=name) for spring, name in zip(found, names, strict=True))
 
 
@@ -176,20 +172,6 @@ def _parent_bone(node: int, parents: list[int], place: dict[int, int]) -> int:
     while node >= 0 and node not in place:
         node = parents[node]
     return place.get(node, -1)
-
-
-def _bone_names(given: list[object]) -> tuple[str, ...]:
-    """Unique names that a doll may have; a bone without a name becomes bone_N."""
-    taken = {WORLD: 1}
-    names = []
-    for number, name in enumerate(given):
-        text = plain_name(name if isinstance(name, str) else '', f'bone_{number}')
-        while text in taken:
-            taken[text] += 1
-            text = f'{text}_{taken[text]}'
-        taken[text] = 1
-        names.append(text)
-    return tuple(names)
 
 
 def yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
@@ -202,11 +184,3 @@ def yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
     if reach < 0.02 * np.ptp(positions, axis=0).max():
         return 0
     return round(float(np.degrees(np.arctan2(left[0], left[1]))) / 90) % 4 * 90
-
-
-def _nearest_rotation(matrix: np.ndarray) -> np.ndarray:
-    """Quaternion (4,) xyzw of the rotation nearest to a matrix (3, 3) with scale or reflection."""
-    u, _, vt = np.linalg.svd(matrix)
-    if np.linalg.det(u @ vt) < 0:
-        u = u * (1.0, 1.0, -1.0)
-    return rotation.from_matrix(u @ vt)

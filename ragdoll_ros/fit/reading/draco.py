@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...files.gltf.accessors import COMPONENT_TYPES
+from ...files.gltf.gltf_file import GltfFile, get_container, get_count, get_objects
 from ...model import errors
-from .accessors import COMPONENT_TYPES
-from .gltf_file import GltfFile, get_container, get_count, get_objects
 
 if TYPE_CHECKING:
     from DracoPy import DracoMesh

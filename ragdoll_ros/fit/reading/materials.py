@@ -5,9 +5,9 @@ texture coordinates. Invalid parts are ignored: no character is refused for its 
 """
 import math
 
+from ...files.gltf.gltf_file import GltfFile, decode_data_uri, get_count, resolve_uri
 from ...model import errors
 from ...model.skeleton import Texture
-from .gltf_file import GltfFile, decode_data_uri, get_count, resolve_uri
 
 MAX_IMAGE_BYTES = 64_000_000
 """Total size of a character's images; each open page receives them once."""

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...model import errors
-from .gltf_file import GltfFile
-from .nodes import Nodes
+from ...files.gltf.bones import rigid_parts, unskinned_meshes
+from ...files.gltf.gltf_file import GltfFile
+from ...files.gltf.nodes import Nodes
 from .skins import Skins, primitives, read_appearance, read_positions, read_triangles
 
 
@@ -18,18 +18,12 @@ def add_rigid_meshes(file: GltfFile, nodes: Nodes, skins: Skins) -> None:
 
     Raises WrongForm where the file has no skin and fewer than two parts.
     """
-    unskinned = [index for index, node in enumerate(file.json['nodes'])
-                 if node.get('mesh') is not None and node.get('skin') is None]
     if not skins.bind_matrices:
-        bones = {node: _bone_of_mesh(file, nodes, node) for node in unskinned}
-        if file.json['skins'] or len(set(bones.values())) < 2:
-            raise errors.WrongForm('skins', 'no skin that moves a mesh',
-                                   'a skinned mesh (a node with both mesh and skin), or a file '
-                                   'without skins whose parts are meshes of several nodes')
+        bones = rigid_parts(file, nodes)
         skins.bind_matrices.update((bone, nodes.worlds[bone]) for bone in bones.values())
         skins.notes.append(f'no skin: the {len(bones)} meshes become rigid parts')
     else:
-        bones = {node: _bone_above(nodes, skins, node) for node in unskinned}
+        bones = {node: _bone_above(nodes, skins, node) for node in unskinned_meshes(file)}
     left = sum(not _add(file, nodes, skins, node, bone) for node, bone in bones.items())
     if left:
         skins.notes.append(f'{left} mesh{"es" * (left > 1)} without a skin and a bone ignored')
@@ -56,13 +50,3 @@ def _bone_above(nodes: Nodes, skins: Skins, node: int) -> int:
     while node >= 0 and node not in skins.bind_matrices:
         node = nodes.parents[node]
     return node
-
-
-def _bone_of_mesh(file: GltfFile, nodes: Nodes, node: int) -> int:
-    """Bone of an unskinned mesh: its parent if that has this mesh only, as a leaf, else itself."""
-    parent = nodes.parents[node]
-    if parent < 0 or nodes.children[node]:
-        return node
-    ends = [other for other in nodes.children[parent] if not nodes.children[other]]
-    held = file.json['nodes'][parent].get('mesh') is not None
-    return node if held or len(ends) > 1 else parent

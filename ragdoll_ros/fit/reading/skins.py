@@ -1,10 +1,4 @@
-"""Skinned meshes of a glTF file in the bind pose, with their influences.
-
-In the bind pose bone j has the transform B inv(M_j), with its inverse bind matrix M_j and the
-transform B from the mesh to the world, the same for all bones of a skin. The nodes of the file may
-be in another pose, such as a step of a walk; B is then an estimate (see ``_mesh_to_world``).
-Without inverse bind matrices the pose of the nodes is the bind pose.
-"""
+"""Skinned meshes of a glTF file in the bind pose, with their influences."""
 import contextlib
 import itertools
 from collections.abc import Iterator
@@ -12,10 +6,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...files.gltf.accessors import read_floats, read_indices
+from ...files.gltf.bind_poses import add_bind_matrices, read_skin
+from ...files.gltf.gltf_file import GltfFile, get_container, get_count, get_objects
+from ...files.gltf.nodes import Nodes
 from ...model import errors
-from .accessors import read_floats, read_indices
-from .gltf_file import GltfFile, get_container, get_count, get_objects
-from .nodes import Nodes
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 """Modes of a primitive; all others are points and lines."""
@@ -80,8 +75,8 @@ def read_skins(file: GltfFile, nodes: Nodes) -> Skins:
     for index, node in enumerate(file.json['nodes']):
         if node.get('mesh') is None or node.get('skin') is None:
             continue
-        joints, inverses = _read_skin(file, node['skin'], f'nodes[{index}].skin')
-        _add_bind_matrices(skins, nodes, joints, inverses)
+        joints, inverses = read_skin(file, node['skin'], f'nodes[{index}].skin')
+        add_bind_matrices(skins.bind_matrices, nodes, joints, inverses, skins.notes)
         matrices = np.stack([skins.bind_matrices[joint] for joint in joints]) @ inverses
         for primitive, where in primitives(file, node, index):
             _add_primitive(file, skins, primitive, joints, matrices, where)
@@ -102,78 +97,6 @@ def read_positions(file: GltfFile, primitive: dict, where: str) -> np.ndarray:
     if attributes.get('POSITION') is None:
         raise errors.WrongForm(f'{where}.attributes', sorted(attributes), 'POSITION')
     return read_floats(file, attributes['POSITION'], 'VEC3', f'{where}.POSITION')
-
-
-def _read_skin(file: GltfFile, index: object, where: str) -> tuple[np.ndarray, np.ndarray]:
-    """Joint nodes (j,) of a skin, and their inverse bind matrices (j, 4, 4)."""
-    skin, where = file.entry('skins', index, where), f'skins[{index}]'
-    joints = get_container(skin, 'joints', list, where)
-    if not joints:
-        raise errors.WrongForm(f'{where}.joints', joints, 'at least one joint')
-    for joint in joints:
-        file.entry('nodes', joint, f'{where}.joints')
-    joints = np.array(joints)
-    if skin.get('inverseBindMatrices') is None:
-        return joints, np.broadcast_to(np.eye(4), (len(joints), 4, 4))
-    where = f'{where}.inverseBindMatrices'
-    values = read_floats(file, skin['inverseBindMatrices'], 'MAT4', where)
-    if len(values) < len(joints):
-        raise errors.OutOfRange(where, len(values), f'{len(joints)} matrices, one for each joint')
-    inverses = values[:len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1).copy()
-    # The specification fixes the last row; exporters write rounding errors there.
-    inverses[:, 3] = (0, 0, 0, 1)
-    singular = np.abs(np.linalg.det(inverses)) < 1e-30
-    if singular.any():
-        raise errors.WrongForm(f'{where}[{int(np.argmax(singular))}]', 'a matrix of determinant 0',
-                               'matrices that have an inverse')
-    return joints, inverses
-
-
-def _add_bind_matrices(skins: Skins, nodes: Nodes, joints: np.ndarray,
-                       inverses: np.ndarray) -> None:
-    """Add the bind matrices of a skin's joints; those of earlier skins are kept."""
-    known = [k for k, joint in enumerate(joints) if int(joint) in skins.bind_matrices]
-    if (inverses == np.eye(4)).all():
-        bind_matrices = nodes.worlds[joints]
-    elif known:
-        mesh_to_world = skins.bind_matrices[int(joints[known[0]])] @ inverses[known[0]]
-        bind_matrices = mesh_to_world @ np.linalg.inv(inverses)
-    else:
-        bind_matrices = _mesh_to_world(skins, nodes, joints, inverses) @ np.linalg.inv(inverses)
-    for joint, bind_matrix in zip(joints, bind_matrices, strict=True):
-        skins.bind_matrices.setdefault(int(joint), bind_matrix)
-
-
-def _mesh_to_world(skins: Skins, nodes: Nodes, joints: np.ndarray,
-                   inverses: np.ndarray) -> np.ndarray:
-    """Transform B (4, 4) from a mesh in its bind pose to the world.
-
-    Each joint gives the estimate world_j M_j; all agree if the nodes are in the bind pose. If not,
-    that of the topmost joint is used, rotated to the nearest of the 24 axis-aligned rotations: a
-    hip in the middle of a step is a few degrees off, a change of axes a multiple of 90.
-    """
-    estimates = nodes.worlds[joints] @ inverses
-    top = min(range(len(joints)), key=lambda k: nodes.order.index(joints[k]))
-    size = np.abs(estimates[top]).max()
-    if not np.isfinite(estimates[top]).all() or not np.abs(np.linalg.det(estimates[top])) > 1e-30:
-        raise errors.WrongForm('nodes', 'a scale of zero or infinity',
-                               'nodes that give the skin an extent')
-    if np.abs(estimates - estimates[top]).max() < 1e-3 * size:
-        return estimates[top]
-    skins.notes.append('the nodes are in another pose than the bind pose, which is used')
-    linear = estimates[top, :3, :3]
-    scale = np.cbrt(np.abs(np.linalg.det(linear)))
-    matrix = estimates[top].copy()
-    matrix[:3, :3] = scale * _nearest_axis_rotation(linear / scale)
-    return matrix
-
-
-def _nearest_axis_rotation(matrix: np.ndarray) -> np.ndarray:
-    """The rotation nearest to a matrix (3, 3) among the 24 that map axes to axes."""
-    permutations = [np.eye(3)[list(p)] for p in itertools.permutations(range(3))]
-    signs = [np.diag(s) for s in itertools.product((1.0, -1.0), repeat=3)]
-    proper = [p @ s for p in permutations for s in signs if np.linalg.det(p @ s) > 0]
-    return max(proper, key=lambda candidate: float(np.sum(candidate * matrix)))
 
 
 def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.ndarray,

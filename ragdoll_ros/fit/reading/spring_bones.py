@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...files.gltf.gltf_file import GltfFile, get_container, get_objects
+from ...files.gltf.nodes import Nodes
 from ...model import errors
 from ...model.swing import LENGTH_RANGE
-from .gltf_file import GltfFile, get_container, get_objects
-from .nodes import Nodes
 
 TIP_LENGTH = 0.07
 """m; length of the segment beyond the last node in VRM 0.x."""

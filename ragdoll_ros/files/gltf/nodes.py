@@ -6,6 +6,9 @@ import numpy as np
 from ...model import errors, rotation
 from .gltf_file import GltfFile, get_container
 
+TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+"""glTF has +Y up, +Z forward and +X left: its (z, x, y) is (x, y, z) here."""
+
 
 @dataclass(frozen=True)
 class Nodes:
