@@ -101,7 +101,8 @@ def test_shortest_arc_turns_one_direction_into_the_other():
         assert rotation.normalized(turned) == pytest.approx(rotation.normalized(b), abs=1e-12)
 
 
-@pytest.mark.parametrize('stretch', [np.eye(3), np.diag((2.0, 0.5, 1.5)), np.diag((3.0, 1.0, -2.0))])
+@pytest.mark.parametrize('stretch', [np.diag(sizes) for sizes in (
+    (1.0, 1.0, 1.0), (2.0, 0.5, 1.5), (3.0, 1.0, -2.0))])
 def test_the_spin_of_the_nearest_rotation_is_its_derivative(stretch):
     """Centred differences of rotations that turn while they are stretched along axes askew."""
     askew = rodrigues((0.3, -0.2, 0.9))
