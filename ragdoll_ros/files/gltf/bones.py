@@ -67,15 +67,15 @@ def _bone_of_mesh(file: GltfFile, nodes: Nodes, node: int) -> int:
 
 def names_of_nodes(file: GltfFile, nodes: Sequence[int]) -> tuple[str, ...]:
     """Unique names of bones, by the names of their nodes."""
-    return bone_names([file.json['nodes'][node].get('name') for node in nodes])
+    return unique_names([file.json['nodes'][node].get('name') for node in nodes], 'bone')
 
 
-def bone_names(given: list[object]) -> tuple[str, ...]:
-    """Unique names that a doll may have; a bone without a name becomes bone_N."""
+def unique_names(given: Sequence[object], kind: str) -> tuple[str, ...]:
+    """Unique names as a doll may have them; what has no name becomes kind_N."""
     taken = {WORLD: 1}
     names = []
     for number, name in enumerate(given):
-        text = plain_name(name if isinstance(name, str) else '', f'bone_{number}')
+        text = plain_name(name if isinstance(name, str) else '', f'{kind}_{number}')
         while text in taken:
             taken[text] += 1
             text = f'{text}_{taken[text]}'

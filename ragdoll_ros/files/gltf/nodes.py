@@ -21,6 +21,8 @@ class Nodes:
     """Every node once, parents first."""
     worlds: np.ndarray
     """(n, 4, 4) global transforms, from the node's frame to the world; units of the file."""
+    locals: np.ndarray
+    """(n, 4, 4) transforms from the node's frame to its parent's."""
 
 
 def read_nodes(file: GltfFile) -> Nodes:
@@ -47,12 +49,12 @@ def read_nodes(file: GltfFile) -> Nodes:
         missing = min(set(range(len(nodes))) - set(order))
         raise errors.JointCycle(f'nodes[{missing}]', 'a cycle among the nodes',
                                 'nodes that form trees')
-    worlds = np.zeros((len(nodes), 4, 4))
+    worlds, local = np.zeros((2, len(nodes), 4, 4))
     for index in order:
-        local = _local_matrix(nodes[index], f'nodes[{index}]')
+        local[index] = _local_matrix(nodes[index], f'nodes[{index}]')
         parent = parents[index]
-        worlds[index] = local if parent < 0 else worlds[parent] @ local
-    return Nodes(parents, below, order, worlds)
+        worlds[index] = local[index] if parent < 0 else worlds[parent] @ local[index]
+    return Nodes(parents, below, order, worlds, local)
 
 
 def _local_matrix(node: dict, where: str) -> np.ndarray:
@@ -60,16 +62,32 @@ def _local_matrix(node: dict, where: str) -> np.ndarray:
     given = node.get('matrix')
     if given is not None:
         return _numbers(given, 16, f'{where}.matrix').reshape(4, 4).T
+    parts = local_parts(node, where)
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation.matrix(parts['rotation']) * parts['scale']
+    matrix[:3, 3] = parts['translation']
+    return matrix
+
+
+def local_parts(node: dict, where: str) -> dict[str, np.ndarray]:
+    """``translation`` (3,), ``rotation``, a unit quaternion (4,), and ``scale`` (3,) of a node.
+
+    A matrix is decomposed, its shear left out. Raises WrongForm, NotFinite or NotUnit.
+    """
+    if node.get('matrix') is not None:
+        matrix = _numbers(node['matrix'], 16, f'{where}.matrix').reshape(4, 4).T
+        turn = rotation.nearest_rotation(matrix[:3, :3])
+        scale = np.diag(rotation.matrix(turn).T @ matrix[:3, :3])
+        return {'translation': matrix[:3, 3], 'rotation': turn, 'scale': scale}
     translation, quaternion, scale = (
-        default if node.get(key) is None else _numbers(node[key], len(default), f'{where}.{key}')
+        np.array(default, float) if node.get(key) is None
+        else _numbers(node[key], len(default), f'{where}.{key}')
         for key, default in (('translation', (0, 0, 0)), ('rotation', rotation.IDENTITY),
                              ('scale', (1, 1, 1))))
     if np.linalg.norm(quaternion) < 1e-9:
         raise errors.NotUnit(f'{where}.rotation', node['rotation'], 'a quaternion, not zero')
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation.matrix(rotation.normalized(quaternion)) * scale
-    matrix[:3, 3] = translation
-    return matrix
+    return {'translation': translation, 'rotation': rotation.normalized(quaternion),
+            'scale': scale}
 
 
 def _numbers(values: object, length: int, where: str) -> np.ndarray:

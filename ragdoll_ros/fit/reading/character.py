@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...files.gltf.bones import bone_names, names_of_nodes
+from ...files.gltf.bones import names_of_nodes, unique_names
 from ...files.gltf.gltf_file import GltfFile
 from ...files.gltf.nodes import TO_ROS, Nodes, read_nodes
 from ...model import errors, rotation
@@ -126,7 +126,7 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
     springs = _springs(file, nodes, skins, place, metres * axes, notes)
     appearance = _read_appearance(file, skins, axes, notes)
-    stem = bone_names([file.path.stem])[0]
+    stem = unique_names([file.path.stem], 'bone')[0]
     return Character(
         stem, names, parents,
         positions * metres, np.stack([rotation.nearest_rotation(matrix) for matrix in linear]),
@@ -162,7 +162,7 @@ def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
             spring, points=spring.points @ matrix.T, carrier=carrier,
             bones=tuple(place[node] for node in spring.nodes if node in place)), notes))
     found = [spring for spring in found if spring.joints]
-    names = bone_names([spring.name for spring in found])
+    names = unique_names([spring.name for spring in found], 'bone')
     return tuple(replace(spring, name=name) for spring, name in zip(found, names, strict=True))
 
 

@@ -1,0 +1,194 @@
+"""Animations of a glTF file: local transforms of its nodes over time, and their derivatives.
+
+Section 3.11 (Animations) and appendix C (Animation Sampler Interpolation Modes) of the glTF 2.0
+specification. Between two keys the derivative is that of the interpolation: of LINEAR keys
+constant, of STEP keys zero, of CUBICSPLINE keys that of the spline. At a key it is the mean of both
+sides: of equally spaced LINEAR keys the centred difference. Before the first key of a track and
+after its last, it stands.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import errors, rotation
+from .accessors import read_floats
+from .gltf_file import GltfFile, get_count, get_objects
+from .nodes import Nodes, local_parts
+
+MAX_ANIMATIONS = 2000
+
+KEY_TOLERANCE = 1e-6
+"""s, within which an instant is that of a key: times of keys are float32."""
+
+WIDTHS = {'translation': 'VEC3', 'rotation': 'VEC4', 'scale': 'VEC3'}
+"""Type of the values of each animated property of a node."""
+
+INTERPOLATIONS = ('LINEAR', 'STEP', 'CUBICSPLINE')
+
+
+@dataclass(frozen=True)
+class NodeTrack:
+    """One property of one node over time: k keys of w numbers.
+
+    ``times`` (k,) s, increasing; ``values`` (k, 3, w) are in-tangent, value, out-tangent; tangents
+    are those of CUBICSPLINE, per s.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    interpolation: str
+    is_rotation: bool
+
+    def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Value (w,) and its derivative per s; a rotation's value is a unit quaternion."""
+        after = int(np.searchsorted(self.times, time))
+        near = min(max(after - 1, 0), len(self.times) - 1)
+        key = min((near, min(after, len(self.times) - 1)),
+                  key=lambda index: abs(self.times[index] - time))
+        if abs(self.times[key] - time) > KEY_TOLERANCE:
+            if 0 < after < len(self.times):
+                return self._between(after - 1, time)
+            return self._unit(self.values[key, 1], np.zeros(self.values.shape[2]))
+        sides = [self._between(first, float(self.times[key])) for first in (key - 1, key)
+                 if 0 <= first < len(self.times) - 1]
+        if not sides:
+            return self._unit(self.values[key, 1], np.zeros(self.values.shape[2]))
+        # A slerp may end in the negative of the quaternion at which the next one begins.
+        value = sides[-1][0]
+        signs = [-1.0 if self.is_rotation and value @ side < 0 else 1.0 for side, _ in sides]
+        rates = [sign * rate for sign, (_, rate) in zip(signs, sides, strict=True)]
+        return value, np.mean(rates, axis=0)
+
+    def _between(self, first: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Value and derivative within the interval after the key ``first``, its ends included."""
+        length = float(self.times[first + 1] - self.times[first])
+        share = (time - float(self.times[first])) / length
+        (_, begin, leave), (arrive, end, _) = self.values[first], self.values[first + 1]
+        if self.interpolation == 'STEP':
+            return self._unit(end if share >= 1 else begin, np.zeros_like(begin))
+        if self.interpolation == 'CUBICSPLINE':
+            powers = np.array((1.0, share, share ** 2, share ** 3))
+            slopes = np.array((0.0, 1.0, 2 * share, 3 * share ** 2)) / length
+            points = np.stack([begin, length * leave, end, length * arrive])
+            return self._unit(powers @ HERMITE @ points, slopes @ HERMITE @ points)
+        if self.is_rotation:
+            return _slerp(begin, end, share, length)
+        return begin + share * (end - begin), (end - begin) / length
+
+    def _unit(self, value: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A rotation's value as a unit quaternion, with its derivative; others as they are."""
+        if not self.is_rotation:
+            return value, rate
+        norm = np.linalg.norm(value)
+        if norm < 1e-9:
+            return np.array(rotation.IDENTITY), np.zeros(4)
+        value = value / norm
+        return value, (rate - value * (value @ rate)) / norm
+
+
+HERMITE = np.array(((1.0, 0, 0, 0), (0, 1, 0, 0), (-3, -2, 3, -1), (2, 1, -2, 1)))
+"""Coefficients of 1, s, s^2, s^3 of a cubic: of its value and slope at 0, and at 1."""
+
+
+def _slerp(begin: np.ndarray, end: np.ndarray, share: float,
+           length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Quaternion on the shorter arc, at constant speed, and its derivative."""
+    begin = rotation.normalized(begin)
+    arc = rotation.rotation_vector(rotation.multiply(
+        rotation.inverse(begin), rotation.normalized(end)))
+    value = rotation.multiply(begin, rotation.from_rotation_vector(share * arc))
+    return value, rotation.multiply(value, np.append(arc / (2 * length), 0.0))
+
+
+@dataclass(frozen=True)
+class NodeAnimation:
+    """An animation of a file: tracks by node and property."""
+
+    name: object
+    """As in the file; None if it has none."""
+    duration: float
+    """s, from 0 to its last key."""
+    tracks: dict[tuple[int, str], NodeTrack]
+
+    def worlds(self, file: GltfFile, nodes: Nodes, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Global transforms (n, 4, 4) of all nodes at ``time``, and their derivatives per s."""
+        moved = {node for node, _ in self.tracks}
+        worlds, rates = np.zeros((2, len(nodes.order), 4, 4))
+        for node in nodes.order:
+            local, rate = (self._local(file, node, time) if node in moved
+                           else (nodes.locals[node], np.zeros((4, 4))))
+            up = nodes.parents[node]
+            worlds[node], rates[node] = (local, rate) if up < 0 else (
+                worlds[up] @ local, rates[up] @ local + worlds[up] @ rate)
+        return worlds, rates
+
+    def _local(self, file: GltfFile, node: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Local transform of a node and its derivative."""
+        parts = local_parts(file.json['nodes'][node], f'nodes[{node}]')
+        found = {key: self.tracks[node, key].at(time) if (node, key) in self.tracks
+                 else (value, np.zeros_like(value)) for key, value in parts.items()}
+        (move, moves), (q, changes), (scale, grows) = (found[key] for key in WIDTHS)
+        turn = rotation.matrix(q)
+        # A rotation matrix is quadratic in the quaternion.
+        turns = (rotation.matrix(q + changes) - rotation.matrix(q - changes)) / 2
+        local, rate = np.eye(4), np.zeros((4, 4))
+        local[:3, :3], local[:3, 3] = turn * scale, move
+        rate[:3, :3], rate[:3, 3] = turns * scale + turn * grows, moves
+        return local, rate
+
+
+def read_animations(file: GltfFile) -> list[NodeAnimation]:
+    """All animations of a file that move nodes. Raises a ModelError for a broken one."""
+    entries = get_objects(file.json, 'animations')
+    if len(entries) > MAX_ANIMATIONS:
+        raise errors.OutOfRange('animations', len(entries), f'at most {MAX_ANIMATIONS}')
+    found = []
+    for index, entry in enumerate(entries):
+        tracks = _read_tracks(file, entry, f'animations[{index}]')
+        if tracks:
+            last = max(float(track.times[-1]) for track in tracks.values())
+            found.append(NodeAnimation(entry.get('name'), last, tracks))
+    return found
+
+
+def _read_tracks(file: GltfFile, entry: dict, where: str) -> dict[tuple[int, str], NodeTrack]:
+    samplers = get_objects(entry, 'samplers', where)
+    tracks: dict[tuple[int, str], NodeTrack] = {}
+    for number, channel in enumerate(get_objects(entry, 'channels', where)):
+        target, place = channel.get('target'), f'{where}.channels[{number}]'
+        # Weights of morph targets move no node, and an extension may define other targets.
+        if not isinstance(target, dict) or target.get('path') not in WIDTHS or (
+                target.get('node') is None):
+            continue
+        file.entry('nodes', target['node'], f'{place}.target.node')
+        sampler = get_count(channel, 'sampler', place)
+        if sampler >= len(samplers):
+            raise errors.OutOfRange(f'{place}.sampler', sampler,
+                                    f'an index below {len(samplers)} in samplers')
+        tracks[target['node'], target['path']] = _read_track(
+            file, samplers[sampler], target['path'], f'{where}.samplers[{sampler}]')
+    return tracks
+
+
+def _read_track(file: GltfFile, sampler: dict, key: str, where: str) -> NodeTrack:
+    interpolation = sampler.get('interpolation', 'LINEAR')
+    if interpolation not in INTERPOLATIONS:
+        raise errors.WrongForm(f'{where}.interpolation', interpolation,
+                               'one of ' + ', '.join(INTERPOLATIONS))
+    times = read_floats(file, sampler.get('input'), 'SCALAR', f'{where}.input')[:, 0]
+    values = read_floats(file, sampler.get('output'), WIDTHS[key], f'{where}.output')
+    each = 3 if interpolation == 'CUBICSPLINE' else 1
+    if len(times) == 0 or len(values) != each * len(times):
+        raise errors.WrongForm(f'{where}.output', f'{len(values)} values',
+                               f'{each} for each of {len(times)} keys, at least one key')
+    if times[0] < 0 or (np.diff(times) <= 0).any():
+        raise errors.WrongForm(f'{where}.input', 'times of keys',
+                               'times from 0 on, each later than the one before')
+    values = values.reshape(len(times), each, -1)
+    if key == 'rotation' and (np.linalg.norm(values[:, each // 2], axis=1) < 1e-9).any():
+        raise errors.NotUnit(f'{where}.output', 0.0, 'quaternions x, y, z, w, not zero')
+    if each == 1:
+        values = np.pad(values, ((0, 0), (1, 1), (0, 0)))
+    return NodeTrack(times, values, interpolation, key == 'rotation')
