@@ -8,6 +8,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .files.animation import load_animations as load_animations
     from .files.doll import load_doll as load_doll
     from .files.doll import save_doll as save_doll
     from .files.limits import load_limits as load_limits
@@ -54,7 +55,8 @@ _MODULES = {
     'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'StaticBody': 'model.static_body',
-    'head_injury_criterion': 'physics.sensors.head_injury', 'load_doll': 'files.doll',
+    'head_injury_criterion': 'physics.sensors.head_injury',
+    'load_animations': 'files.animation', 'load_doll': 'files.doll',
     'load_limits': 'files.limits', 'load_scene': 'files.scene', 'person': 'people.person',
     'run_many': 'physics.run_many', 'save_doll': 'files.doll',
     'save_recording': 'recordings.save', 'save_scene': 'files.scene'}

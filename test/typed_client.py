@@ -36,6 +36,7 @@ from ragdoll_ros import (
     State,
     StaticBody,
     head_injury_criterion,
+    load_animations,
     load_doll,
     load_limits,
     load_scene,
@@ -108,6 +109,10 @@ def main(folder: Path) -> None:
                                     hill, ramp, stone, slope))
     save_scene(scene, folder / 'pair.yaml')
     state = fall(load_scene(str(folder / 'pair.yaml')), folder)
+    character = load_doll('character')
+    starts: list[Placement] = [animation.place(Placement(character), animation.duration)
+                               for animation in load_animations(character).values()]
+    assert not starts
     rows: tuple[int, ...] = state.positions.shape
     assert rows == (len(scene.bone_names), 3) and state.linear_velocities.shape == rows
     assert ends([scene, scene])[1].shape == (rows[0], 13)

@@ -7,11 +7,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..model.errors import ModelError, OutOfRange
+from ..model.errors import (
+    ModelError,
+    ModelErrors,
+    OutOfRange,
+    UnknownAnimation,
+    WrongForm,
+    one_of,
+)
 from ..model.per_doll import PerDoll
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
+from .animation import load_animations, placed
 from .bodies import body_data, build_bodies, follow_data, follow_of
 from .doll import build_doll, doll_data
 from .repeat import repeated
@@ -102,8 +110,10 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
             found += [error.at(where) for error in more]
         if doll is not None and not has_error_under(found, where):
             first = try_build(found, where, _placement, doll, entry)
-            placements += repeated(first, entry['repeat']) if (
-                first and 'repeat' in entry) else [first]
+            copies = repeated(first, entry['repeat']) if first and 'repeat' in entry else [first]
+            if first and 'animation' in entry:
+                copies = try_build(found, where, _animated, copies, entry) or []
+            placements += copies
         if len(placements) > MOST_DOLLS:
             found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
             break
@@ -176,6 +186,30 @@ def _placement(doll: Ragdoll, entry: dict) -> Placement:
             raise
         key = ANGLE_KEYS[name]
         raise type(error)(f'{key}.{angle}', entry[key][angle], error.expected) from None
+
+
+def _animated(copies: list[Placement], entry: dict) -> list[Placement]:
+    """The copies of a doll as its entry's animation has them at its time."""
+    for key in ('spin', *ANGLE_KEYS.values()):
+        if key in entry:
+            raise WrongForm(key, entry[key], 'none: the animation has its own')
+    wanted, doll = entry['animation'], copies[0].doll
+    try:
+        animations = load_animations(doll)
+    except ModelErrors as broken:
+        raise broken.errors[0].at(f'animation.({Path(broken.file).name})') from None
+    except ModelError as error:
+        raise error.at('doll') from None
+    name = wanted['name']
+    if name not in animations:
+        known = one_of(list(animations), name) if animations else (
+            f'no animation: {Path(doll.model or "").name} has none')
+        raise UnknownAnimation('animation.name', name, known)
+    try:
+        motion = animations[name].at(wanted.get('time', 0.0))
+    except ModelError as error:
+        raise error.at('animation') from None
+    return [placed(copy, motion) for copy in copies]
 
 
 def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:

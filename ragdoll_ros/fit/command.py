@@ -14,7 +14,7 @@ from ..model.scene import Placement, all_above_ground
 from .judging.verdict import Verdict, judge
 from .pipeline import Fit, FitOptions, fit_characters
 from .reading.character import read_character
-from .report import doll_report, fit_report
+from .report import animations_report, doll_report, fit_report
 from .robots.robot import read_urdf
 
 EPILOG = """\
@@ -130,8 +130,9 @@ def _make_dolls(options: argparse.Namespace, path: Path) -> list[tuple[Placement
         options.shape, options.orientation, options.weight, options.smallest, options.mass,
         options.masses, tuple(options.keep)))
     heads = _headings([fit.doll for fit in fits], 'character')
-    return [(fit.placed(model=str(path)), fit, head + fit_report(fit))
-            for fit, head in zip(fits, heads, strict=True)]
+    dolls = [fit.placed(model=str(path)) for fit in fits]
+    return [(doll, fit, head + '\n'.join([fit_report(fit), *animations_report(doll.doll)]))
+            for doll, fit, head in zip(dolls, fits, heads, strict=True)]
 
 
 def _load_dolls(options: argparse.Namespace) -> list[tuple[Placement, None, str]]:

@@ -4,13 +4,20 @@ See judging/verdict.py for the verdict.
 """
 import textwrap
 
+import numpy as np
+
+from ..files.animation import Animation, load_animations
 from ..model.compound import Compound
+from ..model.errors import RagdollError
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
 from .bodies.overlap import colliding_overlaps, covered, overlap_share
 from .judging.plausibility import extent
 from .pipeline import BodyFit, Fit
 from .shapes.fitting import TOLERANCE
+
+COMPARED_INSTANTS, COMPARED_ANIMATIONS = 8, 20
+"""Instants of each of the first animations at which the doll is compared: some 20 ms each."""
 
 
 def fit_report(fit: Fit) -> str:
@@ -35,6 +42,30 @@ def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:
         *_table(doll, '', [''] * len(doll.bones)), '',
         f'{len(doll.bones)} bodies, {doll.mass:.4g} kg, {extent(doll):.3g} m',
         *_overlaps(doll), *_warnings(notes)])
+
+
+def animations_report(doll: Ragdoll) -> list[str]:
+    """A line for each animation of the file of a fitted doll: how well the doll can follow it."""
+    try:
+        animations = list(load_animations(doll).values())
+    except RagdollError as error:
+        return _warnings((f'no animations: {" ".join(str(error).split())}',))
+    rest = [f'{each.name} ({each.duration:.3g} s)' for each in animations[COMPARED_ANIMATIONS:]]
+    return [*map(_animation, animations[:COMPARED_ANIMATIONS]), *textwrap.wrap(
+        f'animations that were not compared: {", ".join(rest)}' if rest else '', 97,
+        subsequent_indent='  ', break_long_words=False)]
+
+
+def _animation(animation: Animation) -> str:
+    motions = [animation.at(time)
+               for time in np.linspace(0, animation.duration, COMPARED_INSTANTS).tolist()]
+    distance, bone = max((distance, bone) for motion in motions
+                         for bone, distance in motion.distances.items())
+    clipped = sorted({name for motion in motions for name in motion.clipped})
+    far = f'{1000 * distance:.0f} mm ({bone})' if distance > 0.001 else '1 mm'
+    limits = f'; beyond their limits: {", ".join(clipped)}' if clipped else ''
+    return (f'animation {animation.name}: {animation.duration:.3g} s; '
+            f'followed to within {far}{limits}')
 
 
 def _table(doll: Ragdoll, title: str, columns: list[str]) -> list[str]:

@@ -101,6 +101,10 @@ class UnknownDoll(ModelError):
     """No doll has the name."""
 
 
+class UnknownAnimation(ModelError):
+    """No animation has the name."""
+
+
 class DuplicateName(ModelError):
     """Two of a kind have the same name."""
 

@@ -26,7 +26,7 @@ limits of a swing end at 85."""
 
 
 @dataclass(frozen=True)
-class DollMotion:
+class FollowedMotion:
     """Pose and velocity of a doll, as of a Placement, and how well it follows what was asked."""
 
     pose: Pose
@@ -45,7 +45,7 @@ class DollMotion:
     """Names of the angles that would exceed their limits."""
 
 
-def follow_motions(doll: Ragdoll, motions: Mapping[str, BoneMotion]) -> DollMotion:
+def follow_motions(doll: Ragdoll, motions: Mapping[str, BoneMotion]) -> FollowedMotion:
     """The doll at ``motions`` of its bones, by name, in the frame that the result is in.
 
     The root needs one; a joint whose child has none stays at zero.
@@ -70,11 +70,11 @@ def follow_motions(doll: Ragdoll, motions: Mapping[str, BoneMotion]) -> DollMoti
             spin = spin + rates.get(name, 0.0) * rotation.rotate(turn, axis)
             turn = rotation.multiply(turn, rotation.from_axis_angle(axis, angles.get(name, 0.0)))
         turns[joint.child], spins[joint.child] = turn, spin
-    return _doll_motion(doll, motions, angles, rates, tuple(clipped))
+    return _followed(doll, motions, angles, rates, tuple(clipped))
 
 
-def _doll_motion(doll: Ragdoll, motions: Mapping[str, BoneMotion], angles: dict[str, float],
-                 rates: dict[str, float], clipped: tuple[str, ...]) -> DollMotion:
+def _followed(doll: Ragdoll, motions: Mapping[str, BoneMotion], angles: dict[str, float],
+                 rates: dict[str, float], clipped: tuple[str, ...]) -> FollowedMotion:
     root = motions[doll.root.name]
     pose = Pose(root.position - rotation.rotate(root.turn, doll.root.position), root.turn)
     within = bone_motions(doll, angles, rates)
@@ -84,7 +84,7 @@ def _doll_motion(doll: Ragdoll, motions: Mapping[str, BoneMotion], angles: dict[
     velocity = np.average(speeds, axis=0, weights=[doll.bone(name).mass for name in within])
     distances = {name: float(np.linalg.norm(places[name] - motion.position))
                  for name, motion in motions.items()}
-    return DollMotion(pose, velocity, root.spin, angles, rates, distances, clipped)
+    return FollowedMotion(pose, velocity, root.spin, angles, rates, distances, clipped)
 
 
 def _joint_angles(joint: Joint, turn: np.ndarray, spin: np.ndarray) -> list[tuple[float, float]]:

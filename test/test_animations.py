@@ -1,0 +1,329 @@
+"""Dolls that take over from an animation of their character's file: where they are, how fast."""
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import re
+from pathlib import Path
+
+import animated_rigs
+import fit_rigs
+import numpy as np
+import pytest
+from animated_rigs import rate, worlds_at
+
+from ragdoll_ros import Placement, Scene, Simulation, load_scene, save_scene
+from ragdoll_ros.files.animation import load_animations
+from ragdoll_ros.files.doll import load_doll, save_doll
+from ragdoll_ros.files.gltf.nodes import TO_ROS
+from ragdoll_ros.fit.command import main
+from ragdoll_ros.fit.pipeline import FitOptions, fit_character
+from ragdoll_ros.fit.reading.character import read_character
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.errors import ModelErrors, OutOfRange, RagdollError, WrongForm
+
+RIG = dataclasses.replace(fit_rigs.RIGS['cmu'], name='twin')
+
+W = 2 * math.pi * 1.2
+"""rad/s, of strides and of swinging arms."""
+
+G = 9.8
+
+STILL = np.zeros(3)
+
+
+def swing(axis, size, phase=0.0, middle=0.0):
+    """A bone that swings about an axis: x to its left, y up, z forward."""
+    def move(time):
+        return STILL, np.array(axis) * (middle + size * math.sin(W * time + phase))
+    return move
+
+
+MOVES = {
+    'swing': {'LeftArm': swing((0.8, 0.6, 0), 0.4), 'RightArm': swing((0.8, -0.6, 0), 0.4, 1.0)},
+    'jump': {'Hips': lambda time: (np.array((0.3 * time, 3 * time - G * time ** 2 / 2, 2 * time)),
+                                   STILL)},
+    'run': {'Hips': lambda time: (np.array((0, 0.05 * math.sin(2 * W * time), 3.5 * time)),
+                                  np.array((0.05, 0.1 * math.sin(W * time), 0))),
+            'LeftUpLeg': swing((1, 0, 0), 0.5), 'RightUpLeg': swing((1, 0, 0), 0.5, math.pi),
+            'LeftLeg': swing((1, 0, 0), 0.4, 1.0, 0.5),
+            'RightLeg': swing((1, 0, 0), 0.4, 1.0 + math.pi, 0.5),
+            'LeftArm': swing((1, 0, 0), 0.5, math.pi), 'RightArm': swing((1, 0, 0), 0.5)}}
+
+TIME = 0.51
+"""s, amid two keys: 60 a second."""
+
+
+@pytest.fixture(scope='module')
+def doll(tmp_path_factory):
+    """The doll of a character with all animations, as splines and, for the jump, as lines."""
+    made, times = animated_rigs.document(RIG), np.arange(61) / 60
+    for name, moves in MOVES.items():
+        animated_rigs.animate(made, RIG, moves, times, name=name)
+    animated_rigs.animate(made, RIG, MOVES['jump'], times, 'LINEAR', 'baked jump')
+    path = tmp_path_factory.mktemp('twin') / 'twin.glb'
+    path.write_bytes(made.glb())
+    fitted = fit_character(read_character(path), FitOptions(smallest=0.1)).doll
+    # A hip of the fit is where the skins meet; a bone of the file turns about its head.
+    heads = {bone.name: tuple(TO_ROS @ bone.head) for bone in RIG.bones}
+    joints = tuple(dataclasses.replace(joint, anchor=heads[joint.child])
+                   for joint in fitted.joints)
+    return dataclasses.replace(fitted, joints=joints, model=str(path))
+
+
+@pytest.fixture(scope='module')
+def animations(doll):
+    return load_animations(doll)
+
+
+def analytic(doll, name, time):
+    """Position (n, 3), velocity (n, 3) and spin (n, 3) of the doll's bodies by the functions of
+    time, as if each were fixed to its bone.
+    """
+    index = {bone.name: k for k, bone in enumerate(RIG.bones)}
+    own = [index[bone.name] for bone in doll.bones]
+    bind = np.array(worlds_at(RIG, {}, 0.0))[own]
+    centers = np.array([[*(TO_ROS.T @ bone.position), 1.0] for bone in doll.bones])
+    local = np.einsum('nij,nj->ni', np.linalg.inv(bind), centers)
+
+    def worlds(at):
+        return np.array(worlds_at(RIG, MOVES[name], at))[own]
+
+    here, change = worlds(time), rate(worlds, time)
+    across = TO_ROS @ change[:, :3, :3] @ np.swapaxes(here[:, :3, :3], 1, 2) @ TO_ROS.T
+    return (*(np.einsum('nij,nj->ni', each, local)[:, :3] @ TO_ROS.T for each in (here, change)),
+            np.stack([across[:, 2, 1], across[:, 0, 2], across[:, 1, 0]], axis=1))
+
+
+def started(placement, engine='rigid'):
+    """The first state of a doll in free fall."""
+    pytest.importorskip({'rigid': 'numba', 'bullet': 'pybullet'}.get(engine, engine))
+    with Simulation(Scene('start', (placement,)), engine=engine) as simulation:
+        return simulation.state
+
+
+@pytest.mark.parametrize('engine', ['rigid', 'bullet', 'mujoco'])
+@pytest.mark.parametrize('name', MOVES)
+def test_bodies_are_where_the_bones_are_and_as_fast(doll, animations, name, engine):
+    state = started(animations[name].place(Placement(doll), TIME), engine)
+    positions, velocities, spins = analytic(doll, name, TIME)
+    # Of the spline, whose keys are float32.
+    np.testing.assert_allclose(state.positions, positions, atol=1e-5)
+    np.testing.assert_allclose(state.linear_velocities, velocities, atol=1e-3)
+    np.testing.assert_allclose(state.angular_velocities, spins, atol=1e-3)
+
+
+def momenta(doll, positions, orientations, velocities, spins):
+    """Momentum, angular momentum about the centre of mass and kinetic energy, by the textbook."""
+    masses = np.array([bone.mass for bone in doll.bones])[:, None]
+    turned = rotation.rotate(orientations, np.array([bone.inertia for bone in doll.bones])
+                             * rotation.rotate(rotation.inverse(orientations), spins))
+    center, mean = (np.sum(masses * each, axis=0) / doll.mass for each in (positions, velocities))
+    angular = np.sum(masses * np.cross(positions - center, velocities - mean) + turned, axis=0)
+    energy = np.sum(masses * velocities ** 2) / 2 + np.sum(spins * turned) / 2
+    return doll.mass * mean, angular, energy
+
+
+@pytest.mark.parametrize('engine', ['rigid', 'bullet', 'mujoco'])
+@pytest.mark.parametrize('name', MOVES)
+def test_momentum_and_energy_are_those_of_the_animation(doll, animations, name, engine):
+    """Of the doll's bodies as they pass by: differences of order 4 of their placed poses."""
+    here = Placement(doll, '', (1, 2, 3), tuple(rotation.normalized((0.1, 0.2, 0.3, 0.9))))
+    state = started(animations[name].place(here, TIME), engine)
+    h = 2e-3
+
+    @functools.cache
+    def poses(time):
+        placement = animations[name].place(here, time)
+        return [placement.bone_pose(bone) for bone in doll.bones]
+
+    orientations = np.array([pose.orientation for pose in poses(TIME)])
+    turns = rate(lambda time: [rotation.matrix(pose.orientation) for pose in poses(time)], TIME, h)
+    across = turns @ np.swapaxes(rotation.matrix(orientations), 1, 2)
+    due = momenta(doll, np.array([pose.position for pose in poses(TIME)]), orientations,
+                  rate(lambda time: [pose.position for pose in poses(time)], TIME, h),
+                  np.stack([across[:, 2, 1], across[:, 0, 2], across[:, 1, 0]], axis=1))
+    found = momenta(doll, state.positions, state.orientations, state.linear_velocities,
+                    state.angular_velocities)
+    # Angles are rounded to 2e-11 rad, their differences to 1e-8 rad/s.
+    for value, right in zip(found, due, strict=True):
+        np.testing.assert_allclose(value, right, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize('engine', ['rigid', 'bullet', 'mujoco'])
+@pytest.mark.parametrize(('name', 'time'), [('jump', TIME), ('baked jump', 0.5)])
+def test_a_jump_that_goes_limp_keeps_its_parabola(doll, animations, name, time, engine):
+    """The centre of mass: of a spline at any time; of LINEAR keys, which are chords, at a key."""
+    pytest.importorskip({'rigid': 'numba', 'bullet': 'pybullet'}.get(engine, engine))
+    masses = [bone.mass for bone in doll.bones]
+    scene = Scene('jump', (animations[name].place(Placement(doll), time),), gravity=(0, 0, -G))
+    with Simulation(scene, engine=engine) as simulation:
+        for _ in range(30):
+            state = simulation.advance()
+    # glTF's y is up, z forward, x left.
+    left, up, forward = MOVES['jump']['Hips'](time + 0.3)[0]
+    center = np.average(state.positions, axis=0, weights=masses)
+    # MuJoCo's semi-implicit Euler falls behind by g h t / 2, h being 1 ms.
+    late = G * 0.001 * 0.3 / 2 if engine == 'mujoco' else 0.0
+    due = doll.mass_centre + np.array((forward, left, up - late))
+    assert center == pytest.approx(due, abs=1e-5)
+
+
+def scene_file(tmp_path, doll, **entry):
+    save_doll(doll, tmp_path / 'twin.yaml')
+    fields = ', '.join(f'{key}: {value}' for key, value in entry.items())
+    path = tmp_path / 'scene.yaml'
+    path.write_text(f'dolls:\n  - {{doll: twin.yaml, {fields}}}\n')
+    return str(path)
+
+
+def test_a_scene_starts_within_an_animation(tmp_path, doll, animations):
+    """It is plain angles and velocities from then on, which are written."""
+    turn = tuple(rotation.from_axis_angle((0, 0, 1), 1.0).tolist())
+    scene = load_scene(scene_file(
+        tmp_path, doll, animation=f'{{name: run, time: {TIME}}}', position=[1, 2, 0.5],
+        orientation=list(turn), velocity=[0.5, 0, 0]))
+    due = animations['run'].place(
+        Placement(scene.dolls[0].doll, '', (1, 2, 0.5), turn, (0.5, 0, 0)), TIME)
+    assert scene.dolls[0] == due
+    along = rotation.rotate(turn, (3.5, 0, 0)) + np.array((0.5, 0, 0))
+    assert due.velocity[:2] == pytest.approx(along[:2], abs=0.3)
+    save_scene(scene, tmp_path / 'saved.yaml')
+    assert load_scene(str(tmp_path / 'saved.yaml')) == scene
+
+
+def test_copies_run_where_each_is_turned(tmp_path, doll):
+    scene = load_scene(scene_file(tmp_path, doll, animation='{name: run}',
+                                  repeat='{count: 3, grid: [2, 2, 0], turned: yaw, seed: 4}'))
+    headings = {round(math.degrees(math.atan2(copy.velocity[1], copy.velocity[0])))
+                for copy in scene.dolls}
+    assert len(headings) == 3
+    for copy in scene.dolls:
+        within = rotation.rotate(rotation.inverse(copy.orientation), copy.velocity)
+        assert within == pytest.approx(rotation.rotate(rotation.inverse(
+            scene.dolls[0].orientation), scene.dolls[0].velocity), abs=1e-9)
+
+
+@pytest.mark.parametrize(('entry', 'place', 'words'), [
+    ({'animation': '{name: walk}'}, 'animation.name',
+     'UnknownAnimation: .walk.; expected one of swing, jump, run, baked jump'),
+    ({'animation': '{name: run, time: 1.5}'}, 'animation.time', 'OutOfRange: 1.5; expected 0 to 1'),
+    ({'animation': '{name: run, time: -1}'}, 'animation.time', 'expected 0 or more'),
+    ({'animation': '{name: run, time: .nan}'}, 'animation.time', 'OutOfRange: nan'),
+    ({'animation': '{time: 0.1}'}, 'animation', 'expected the missing name'),
+    ({'animation': '{name: run, start: 0.1}'}, 'animation', 'expected only name, time'),
+    ({'animation': 'run'}, 'animation', 'expected a mapping'),
+    ({'animation': '{name: run}', 'spin': [0, 0, 1]}, 'spin', 'none: the animation has its own'),
+    ({'animation': '{name: run}', 'angles_deg': '{LeftLeg: 20}'}, 'angles_deg', 'none: the'),
+    ({'animation': '{name: run}', 'rates_deg_s': '{LeftLeg: 20}'}, 'rates_deg_s', 'none: the')])
+def test_a_wrong_entry_is_named(tmp_path, doll, entry, place, words):
+    with pytest.raises(ModelErrors, match=words) as caught:
+        load_scene(scene_file(tmp_path, doll, **entry))
+    assert [error.path for error in caught.value.errors] == [f'dolls[0].{place}']
+
+
+@pytest.mark.parametrize(('change', 'words'), [
+    ({'model': None}, 'doll.model: WrongForm: None; expected the .glb'),
+    ({'model': '/nowhere/twin.glb'}, r'animation.\(twin.glb\): Unreadable: .*; expected a file'),
+    ({'riders': ()}, 'doll.model: WrongForm: .*; expected the .glb')])
+def test_a_doll_without_its_file_is_named(tmp_path, doll, change, words):
+    with pytest.raises(ModelErrors, match=r'dolls\[0\].' + words):
+        load_scene(scene_file(tmp_path, dataclasses.replace(doll, **change),
+                              animation='{name: run}'))
+
+
+def test_a_doll_of_another_file_is_refused(doll, tmp_path):
+    other = fit_rigs.write(fit_rigs.RIGS['star'], tmp_path)
+    animated = animated_rigs.document(fit_rigs.RIGS['star'])
+    animated_rigs.animate(animated, fit_rigs.RIGS['star'], {'middle': swing((1, 0, 0), 1)}, (0, 1))
+    other.write_bytes(animated.glb())
+    with pytest.raises(RagdollError, match='riders: UnknownBone'):
+        load_animations(dataclasses.replace(doll, model=str(other)))
+
+
+def test_a_placement_with_angles_of_its_own_is_refused(doll, animations):
+    with pytest.raises(WrongForm, match='angles'):
+        animations['run'].place(Placement(doll, angles={'LeftLeg': 0.1}), 0.0)
+    with pytest.raises(OutOfRange, match='time'):
+        animations['run'].at(2.0)
+    with pytest.raises(WrongForm, match='a doll with the bone'):
+        animations['run'].place(Placement(fit_rigs.fitted('star').doll), 0.0)
+
+
+def swinging(rig, folder):
+    """The doll of a rig amid a motion, in its own frame."""
+    front = np.array((-1, 1, -1)) if rig.name == 'faces_backwards' else 1
+    moves = {f'mixamorig:{key}': lambda time, move=move: tuple(front * move(time))
+             for key, move in (MOVES['swing'] | {'Hips': MOVES['run']['Hips']}).items()}
+    made = animated_rigs.document(rig)
+    animated_rigs.animate(made, rig, moves, np.arange(31) / 30)
+    path = folder / f'{rig.name}.glb'
+    path.write_bytes(made.glb())
+    doll = fit_character(read_character(path), FitOptions(smallest=0.2)).doll
+    return load_animations(dataclasses.replace(doll, model=str(path)))['move'].at(TIME)
+
+
+@pytest.fixture(scope='module')
+def plain(tmp_path_factory):
+    return swinging(dataclasses.replace(fit_rigs.RIGS['centimetres'], name='plain', unit=1.0),
+                    tmp_path_factory.mktemp('plain'))
+
+
+@pytest.mark.parametrize('name', ['centimetres', 'turned_scaled_moved', 'faces_backwards',
+                                  'no_binds', 'scaled_nodes'])
+def test_units_axes_and_armatures_make_no_difference(tmp_path, plain, name):
+    """The same motion in every one of them: the same angles and speeds, in the doll's own frame."""
+    found = swinging(fit_rigs.RIGS[name], tmp_path)
+    for key, tolerance in (('angles', 1e-5), ('rates', 1e-4), ('velocity', 1e-4), ('spin', 1e-4)):
+        assert getattr(found, key) == pytest.approx(getattr(plain, key), abs=tolerance)
+
+
+def test_the_report_of_a_fit_names_the_animations(tmp_path, capsys):
+    """With their durations, the farthest bone and what exceeds its range: a broken elbow."""
+    made = animated_rigs.document(RIG)
+    animated_rigs.animate(made, RIG, MOVES['jump'], (0.0, 0.25), name='hop')
+    animated_rigs.animate(made, RIG, {'LeftForeArm': swing((0, 1, 0), 1.0)}, (0.0, 0.1, 0.2),
+                          name='wrong elbow')
+    (tmp_path / 'twin.glb').write_bytes(made.glb())
+    assert main([str(tmp_path / 'twin.glb'), '-o', str(tmp_path / 'twin.yaml')]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if 'animation' in line]
+    assert lines[0] == 'animation hop: 0.25 s; followed to within 1 mm'
+    # The wrist bends back as far as it can, or the hand would be 306 mm off.
+    assert lines[1] == ('animation wrong elbow: 0.2 s; followed to within 278 mm (LeftHand); '
+                        'beyond their limits: LeftForeArm, LeftHand_2')
+    fitted = load_doll(str(tmp_path / 'twin.yaml'))
+    scene = load_scene(scene_file(tmp_path, fitted,
+                                  animation='{name: hop, time: 0.125}'))
+    assert scene.dolls[0].velocity == pytest.approx((2, 0.3, 3 - G * 0.125), abs=1e-4)
+
+
+def test_a_broken_animation_is_a_warning_of_the_fit(tmp_path, capsys):
+    made = animated_rigs.document(RIG)
+    animated_rigs.animate(made, RIG, MOVES['jump'], (0.5, 0.25), name='back in time')
+    (tmp_path / 'twin.glb').write_bytes(made.glb())
+    assert main([str(tmp_path / 'twin.glb')]) == 0
+    assert 'warning: no animations: ' in capsys.readouterr().out
+
+
+def test_python_of_the_fit_page_moves_the_doll_until_it_goes_limp(tmp_path):
+    """Its centre of mass is on the parabola of the jump 0.05 s after that."""
+    made = animated_rigs.document(RIG)
+    animated_rigs.animate(made, RIG, MOVES['jump'], np.arange(31) / 30)
+    (tmp_path / 'twin.glb').write_bytes(made.glb())
+    main([str(tmp_path / 'twin.glb'), '-o', str(tmp_path / 'twin.yaml')])
+    page = (Path(__file__).resolve().parent.parent / 'docs/fit.md').read_text()
+    code = next(block for block in re.findall(r'^```python\n(.*?)^```', page, re.M | re.S)
+                if 'load_animations' in block)
+    names = {}
+    for theirs, ours in (("'character'", repr(str(tmp_path / 'twin.yaml'))), ('0.6', '0.2'),
+                         ('300', '25')):
+        assert theirs in code
+        code = code.replace(theirs, ours)
+    exec(code, names)
+    left, up, forward = MOVES['jump']['Hips'](0.25)[0]
+    placement = names['scene'].dolls[0]
+    masses = [bone.mass for bone in placement.doll.bones]
+    center = np.average(names['state'].positions, axis=0, weights=masses)
+    assert center == pytest.approx(placement.position + placement.doll.mass_centre
+                                   + np.array((forward, left, up)), abs=1e-5)
