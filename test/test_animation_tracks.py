@@ -7,6 +7,7 @@ import fit_rigs
 import numpy as np
 import pytest
 
+from ragdoll_ros.files.gltf import tracks
 from ragdoll_ros.files.gltf.gltf_file import GltfFile
 from ragdoll_ros.files.gltf.nodes import read_nodes
 from ragdoll_ros.files.gltf.tracks import NodeTrack, read_animations
@@ -120,7 +121,7 @@ def test_a_child_turns_with_its_parent(tmp_path):
     half = math.sqrt(0.5)
     file = written(tmp_path, turns=((0, 0, 0, 1), (half, 0, 0, half)))
     animation, = read_animations(file)
-    worlds, rates = animation.worlds(file, read_nodes(file), 0.5)
+    worlds, rates = animation.worlds(read_nodes(file), 0.5)
     angle, speed = math.pi / 4, math.pi / 2
     # Keys are float32.
     assert worlds[1, :3, 3] == pytest.approx(
@@ -146,7 +147,7 @@ def test_a_broken_track_is_named(tmp_path, place, fault, times, turns):
 
     file = written(tmp_path, change, times, turns or ((0, 0, 0, 1),) * 2)
     with pytest.raises(ModelError) as caught:
-        read_animations(file)
+        read_animations(file)[0].tracks  # noqa: B018
     assert caught.value.path == place
 
 
@@ -157,9 +158,23 @@ def test_a_broken_track_is_named(tmp_path, place, fault, times, turns):
 def test_a_broken_channel_is_named(tmp_path, place, channel):
     file = written(tmp_path, lambda data: data['animations'][0]['channels'][0].update(channel))
     with pytest.raises(ModelError) as caught:
-        read_animations(file)
+        read_animations(file)[0].tracks  # noqa: B018
     assert caught.value.path == place
 
 
 def test_a_file_without_animations_has_none(tmp_path):
     assert read_animations(written(tmp_path, lambda data: data.pop('animations'))) == []
+
+
+def test_too_many_keys_are_refused(tmp_path, monkeypatch):
+    """The limit counts all tracks of an animation: they may share one accessor."""
+    monkeypatch.setattr(tracks, 'MAX_KEYS', 5)
+    times, turns = (0, 1, 2), ((0, 0, 0, 1),) * 3
+    assert read_animations(written(tmp_path, times=times, turns=turns))[0].duration == 2
+
+    def change(data):
+        data['animations'][0]['channels'].append(
+            {'sampler': 0, 'target': {'node': 1, 'path': 'rotation'}})
+
+    with pytest.raises(ModelError, match='6 keys'):
+        read_animations(written(tmp_path, change, times, turns))[0].tracks  # noqa: B018

@@ -303,7 +303,8 @@ def test_a_broken_animation_is_a_warning_of_the_fit(tmp_path, capsys):
     animated_rigs.animate(made, RIG, MOVES['jump'], (0.5, 0.25), name='back in time')
     (tmp_path / 'twin.glb').write_bytes(made.glb())
     assert main([str(tmp_path / 'twin.glb')]) == 0
-    assert 'warning: no animations: ' in capsys.readouterr().out
+    assert ('warning: animation back in time: animations[0].samplers[0].input: WrongForm: '
+            in capsys.readouterr().out)
 
 
 def test_python_of_the_fit_page_moves_the_doll_until_it_goes_limp(tmp_path):

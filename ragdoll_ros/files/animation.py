@@ -29,7 +29,6 @@ from .gltf.tracks import NodeAnimation, read_animations
 class _File:
     """What the animations of a file need of it."""
 
-    file: GltfFile
     nodes: Nodes
     bones: Bones
     animations: dict[str, NodeAnimation]
@@ -49,13 +48,9 @@ class Carrier:
 
 @dataclass(frozen=True, repr=False)
 class Animation:
-    """An animation of the file of a doll's character.
-
-    ``name`` is as in the file, unique in it; ``duration`` in s, from its beginning at 0.
-    """
+    """An animation of the file of a doll's character; ``name`` is as there, and unique."""
 
     name: str
-    duration: float
     doll: Ragdoll
     _source: _File
     _to_doll: np.ndarray
@@ -64,15 +59,20 @@ class Animation:
     def __repr__(self) -> str:
         return f'Animation {self.name!r} of {self.doll.name!r}: {self.duration:g} s'
 
+    @property
+    def duration(self) -> float:
+        """s, from its beginning at 0. Raises a ModelError for a broken track."""
+        return self._source.animations[self.name].duration
+
     def at(self, time: float) -> FollowedMotion:
         """The doll's motion at ``time`` s from the beginning, in the doll's frame of the bind pose.
 
         Its velocities are derivatives of the file's interpolation; at a key the mean of both
-        sides. Raises OutOfRange for a time that is not within the animation.
+        sides. Raises OutOfRange for a time that is not within the animation, another ModelError
+        for a broken track.
         """
         errors.check_range('time', time, 0.0, self.duration)
-        source = self._source
-        worlds, rates = source.animations[self.name].worlds(source.file, source.nodes, time)
+        worlds, rates = self._source.animations[self.name].worlds(self._source.nodes, time)
         motions = {}
         for carrier in self._carriers:
             moved, rate = (self._to_doll @ each[carrier.node] @ carrier.from_bind
@@ -149,8 +149,7 @@ def load_animations(doll: Ragdoll) -> dict[str, Animation]:
         return {}
     to_doll = _file_to_doll(doll, source)
     carriers = _carriers(doll, source.bones, to_doll)
-    return {name: Animation(name, each.duration, doll, source, to_doll, carriers)
-            for name, each in source.animations.items()}
+    return {name: Animation(name, doll, source, to_doll, carriers) for name in source.animations}
 
 
 @functools.lru_cache(maxsize=4)
@@ -159,8 +158,8 @@ def _read(path: str, _: tuple[int, int]) -> _File:
     file = GltfFile(path)
     nodes = read_nodes(file)
     found = read_animations(file)
-    names = unique_names([each.name for each in found], 'animation')
-    return _File(file, nodes, read_bones(file, nodes), dict(zip(names, found, strict=True)))
+    names = unique_names([each.entry.get('name') for each in found], 'animation')
+    return _File(nodes, read_bones(file, nodes), dict(zip(names, found, strict=True)))
 
 
 def _file_to_doll(doll: Ragdoll, source: _File) -> np.ndarray:

@@ -50,13 +50,20 @@ def animations_report(doll: Ragdoll) -> list[str]:
         animations = list(load_animations(doll).values())
     except RagdollError as error:
         return _warnings((f'no animations: {" ".join(str(error).split())}',))
-    rest = [f'{each.name} ({each.duration:.3g} s)' for each in animations[COMPARED_ANIMATIONS:]]
+    rest = ', '.join(each.name for each in animations[COMPARED_ANIMATIONS:])
     return [*map(_animation, animations[:COMPARED_ANIMATIONS]), *textwrap.wrap(
-        f'animations that were not compared: {", ".join(rest)}' if rest else '', 97,
+        f'animations that were not compared: {rest}' if rest else '', 97,
         subsequent_indent='  ', break_long_words=False)]
 
 
 def _animation(animation: Animation) -> str:
+    try:
+        return _followed(animation)
+    except RagdollError as error:
+        return f'warning: animation {animation.name}: {error}'
+
+
+def _followed(animation: Animation) -> str:
     motions = [animation.at(time)
                for time in np.linspace(0, animation.duration, COMPARED_INSTANTS).tolist()]
     distance, bone = max((distance, bone) for motion in motions

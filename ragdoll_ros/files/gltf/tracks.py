@@ -8,21 +8,23 @@ after its last, it stands.
 """
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...model import errors, rotation
 from .accessors import read_floats
-from .gltf_file import GltfFile, get_count, get_objects
+from .gltf_file import GltfFile, get_container, get_count, get_objects
 from .nodes import Nodes, local_parts
 
-MAX_ANIMATIONS = 2000
+MAX_ANIMATIONS, MAX_KEYS = 2000, 2_000_000
+"""Animations of a file, and keys of one: 1500 bones for 20 s at 60 frames a second."""
 
 KEY_TOLERANCE = 1e-6
 """s, within which an instant is that of a key: times of keys are float32."""
 
-WIDTHS = {'translation': 'VEC3', 'rotation': 'VEC4', 'scale': 'VEC3'}
+PROPERTIES = {'translation': 'VEC3', 'rotation': 'VEC4', 'scale': 'VEC3'}
 """Type of the values of each animated property of a node."""
 
 INTERPOLATIONS = ('LINEAR', 'STEP', 'CUBICSPLINE')
@@ -102,34 +104,44 @@ def _slerp(begin: np.ndarray, end: np.ndarray, share: float,
     return value, rotation.multiply(value, np.append(arc / (2 * length), 0.0))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NodeAnimation:
-    """An animation of a file: tracks by node and property."""
+    """An animation of a file. Its tracks are read when they are first needed: of hundreds of
+    animations of a game's character, a scene wants one.
+    """
 
-    name: object
-    """As in the file; None if it has none."""
-    duration: float
-    """s, from 0 to its last key."""
-    tracks: dict[tuple[int, str], NodeTrack]
+    file: GltfFile
+    entry: dict
+    where: str
 
-    def worlds(self, file: GltfFile, nodes: Nodes, time: float) -> tuple[np.ndarray, np.ndarray]:
+    @functools.cached_property
+    def tracks(self) -> dict[tuple[int, str], NodeTrack]:
+        """Tracks by node and property. Raises a ModelError for a broken one."""
+        return _read_tracks(self.file, self.entry, self.where)
+
+    @property
+    def duration(self) -> float:
+        """s, from 0 to its last key."""
+        return max(float(track.times[-1]) for track in self.tracks.values())
+
+    def worlds(self, nodes: Nodes, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Global transforms (n, 4, 4) of all nodes at ``time``, and their derivatives per s."""
         moved = {node for node, _ in self.tracks}
         worlds, rates = np.zeros((2, len(nodes.order), 4, 4))
         for node in nodes.order:
-            local, rate = (self._local(file, node, time) if node in moved
+            local, rate = (self._local(node, time) if node in moved
                            else (nodes.locals[node], np.zeros((4, 4))))
             up = nodes.parents[node]
             worlds[node], rates[node] = (local, rate) if up < 0 else (
                 worlds[up] @ local, rates[up] @ local + worlds[up] @ rate)
         return worlds, rates
 
-    def _local(self, file: GltfFile, node: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+    def _local(self, node: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Local transform of a node and its derivative."""
-        parts = local_parts(file.json['nodes'][node], f'nodes[{node}]')
+        parts = local_parts(self.file.json['nodes'][node], f'nodes[{node}]')
         found = {key: self.tracks[node, key].at(time) if (node, key) in self.tracks
                  else (value, np.zeros_like(value)) for key, value in parts.items()}
-        (move, moves), (q, changes), (scale, grows) = (found[key] for key in WIDTHS)
+        (move, moves), (q, changes), (scale, grows) = (found[key] for key in PROPERTIES)
         turn = rotation.matrix(q)
         # A rotation matrix is quadratic in the quaternion.
         turns = (rotation.matrix(q + changes) - rotation.matrix(q - changes)) / 2
@@ -144,31 +156,40 @@ def read_animations(file: GltfFile) -> list[NodeAnimation]:
     entries = get_objects(file.json, 'animations')
     if len(entries) > MAX_ANIMATIONS:
         raise errors.OutOfRange('animations', len(entries), f'at most {MAX_ANIMATIONS}')
+    found = [NodeAnimation(file, entry, f'animations[{index}]')
+             for index, entry in enumerate(entries)]
+    return [each for each in found if _node_channels(each.entry, each.where)]
+
+
+def _node_channels(entry: dict, where: str) -> list[tuple[dict, dict, str]]:
+    """Channels that move nodes, with their targets and their places in the file.
+
+    Weights of morph targets move none, and an extension may define other targets.
+    """
     found = []
-    for index, entry in enumerate(entries):
-        tracks = _read_tracks(file, entry, f'animations[{index}]')
-        if tracks:
-            last = max(float(track.times[-1]) for track in tracks.values())
-            found.append(NodeAnimation(entry.get('name'), last, tracks))
+    for number, channel in enumerate(get_objects(entry, 'channels', where)):
+        target = get_container(channel, 'target', dict, f'{where}.channels[{number}]')
+        if target.get('path') in PROPERTIES and target.get('node') is not None:
+            found.append((channel, target, f'{where}.channels[{number}]'))
     return found
 
 
 def _read_tracks(file: GltfFile, entry: dict, where: str) -> dict[tuple[int, str], NodeTrack]:
     samplers = get_objects(entry, 'samplers', where)
     tracks: dict[tuple[int, str], NodeTrack] = {}
-    for number, channel in enumerate(get_objects(entry, 'channels', where)):
-        target, place = channel.get('target'), f'{where}.channels[{number}]'
-        # Weights of morph targets move no node, and an extension may define other targets.
-        if not isinstance(target, dict) or target.get('path') not in WIDTHS or (
-                target.get('node') is None):
-            continue
+    total = 0
+    for channel, target, place in _node_channels(entry, where):
         file.entry('nodes', target['node'], f'{place}.target.node')
         sampler = get_count(channel, 'sampler', place)
         if sampler >= len(samplers):
             raise errors.OutOfRange(f'{place}.sampler', sampler,
                                     f'an index below {len(samplers)} in samplers')
-        tracks[target['node'], target['path']] = _read_track(
-            file, samplers[sampler], target['path'], f'{where}.samplers[{sampler}]')
+        track = _read_track(file, samplers[sampler], target['path'],
+                            f'{where}.samplers[{sampler}]')
+        total += len(track.times)
+        if total > MAX_KEYS:
+            raise errors.OutOfRange(where, f'{total} keys', f'at most {MAX_KEYS}')
+        tracks[target['node'], target['path']] = track
     return tracks
 
 
@@ -178,7 +199,7 @@ def _read_track(file: GltfFile, sampler: dict, key: str, where: str) -> NodeTrac
         raise errors.WrongForm(f'{where}.interpolation', interpolation,
                                'one of ' + ', '.join(INTERPOLATIONS))
     times = read_floats(file, sampler.get('input'), 'SCALAR', f'{where}.input')[:, 0]
-    values = read_floats(file, sampler.get('output'), WIDTHS[key], f'{where}.output')
+    values = read_floats(file, sampler.get('output'), PROPERTIES[key], f'{where}.output')
     each = 3 if interpolation == 'CUBICSPLINE' else 1
     if len(times) == 0 or len(values) != each * len(times):
         raise errors.WrongForm(f'{where}.output', f'{len(values)} values',
