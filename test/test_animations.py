@@ -18,7 +18,7 @@ from ragdoll_ros.files.animation import load_animations
 from ragdoll_ros.files.doll import load_doll, save_doll
 from ragdoll_ros.files.gltf.nodes import TO_ROS
 from ragdoll_ros.fit.command import main
-from ragdoll_ros.fit.pipeline import FitOptions, fit_character
+from ragdoll_ros.fit.pipeline import FitOptions, fit_character, fit_characters
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import ModelErrors, OutOfRange, RagdollError, WrongForm
@@ -251,12 +251,12 @@ def test_a_placement_with_angles_of_its_own_is_refused(doll, animations):
         animations['run'].place(Placement(fit_rigs.fitted('star').doll), 0.0)
 
 
-def swinging(rig, folder):
+def swinging(rig, folder, document=animated_rigs.document):
     """The doll of a rig amid a motion, in its own frame."""
     front = np.array((-1, 1, -1)) if rig.name == 'faces_backwards' else 1
     moves = {f'mixamorig:{key}': lambda time, move=move: tuple(front * move(time))
              for key, move in (MOVES['swing'] | {'Hips': MOVES['run']['Hips']}).items()}
-    made = animated_rigs.document(rig)
+    made = document(rig)
     animated_rigs.animate(made, rig, moves, np.arange(31) / 30)
     path = folder / f'{rig.name}.glb'
     path.write_bytes(made.glb())
@@ -277,6 +277,48 @@ def test_units_axes_and_armatures_make_no_difference(tmp_path, plain, name):
     found = swinging(fit_rigs.RIGS[name], tmp_path)
     for key, tolerance in (('angles', 1e-5), ('rates', 1e-4), ('velocity', 1e-4), ('spin', 1e-4)):
         assert getattr(found, key) == pytest.approx(getattr(plain, key), abs=tolerance)
+
+
+@pytest.mark.parametrize('name', ['one_bone', 'spider', 'four_legs_unnamed_centimetres'])
+@pytest.mark.parametrize('unit', [1.0, 100.0])
+def test_an_animation_that_stands_still_is_the_bind_pose(tmp_path, name, unit):
+    rig = dataclasses.replace(fit_rigs.RIGS[name], unit=unit)
+    made = animated_rigs.document(rig)
+    animated_rigs.animate(made, rig, {rig.bones[0].name: lambda time: (STILL, STILL)}, (0, 1))
+    path = tmp_path / 'still.glb'
+    path.write_bytes(made.glb())
+    fit = fit_character(read_character(path, 1 / unit), FitOptions(smallest=0.2))
+    assert_bind_pose(load_animations(fit.placed(str(path)).doll)['move'].at(0.5))
+
+
+def assert_bind_pose(motion):
+    """To within the rounding of bones to float32."""
+    assert motion.pose.position == pytest.approx((0, 0, 0), abs=1e-6)
+    assert rotation.angle_between(motion.pose.orientation, rotation.IDENTITY) < 1e-6
+    assert max(map(abs, motion.angles.values()), default=0) < 1e-6
+    assert max(motion.distances.values()) < 1e-6
+
+
+def test_nodes_with_a_matrix_are_animated_too(tmp_path, plain):
+    """Against the specification, but programs draw them."""
+    rig = dataclasses.replace(fit_rigs.RIGS['centimetres'], name='matrices', unit=1.0)
+    found = swinging(rig, tmp_path, fit_rigs.document)
+    assert found.angles == pytest.approx(plain.angles, abs=1e-6)
+    assert found.rates == pytest.approx(plain.rates, abs=1e-5)
+
+
+def test_each_character_of_a_file_moves_in_its_own_frame(tmp_path):
+    """Two of them, one turned and aside: an animation that stands still is the bind pose."""
+    aside = dataclasses.replace(RIG, root=fit_rigs.matrix((0, fit_rigs.HALF, 0, fit_rigs.HALF),
+                                                          move=(3, 0, 1)))
+    made = fit_rigs.beside(animated_rigs.document(RIG), animated_rigs.document(aside))
+    animated_rigs.animate(made, RIG, {'Head': lambda time: (STILL, STILL)}, (0, 1))
+    path = tmp_path / 'two.glb'
+    path.write_bytes(made.glb())
+    fits = fit_characters(read_character(path), FitOptions(smallest=0.2))
+    assert len(fits) == 2
+    for fit in fits:
+        assert_bind_pose(load_animations(fit.placed(str(path)).doll)['move'].at(0.5))
 
 
 def test_the_report_of_a_fit_names_the_animations(tmp_path, capsys):

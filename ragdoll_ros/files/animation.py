@@ -214,7 +214,11 @@ def _edges(places: dict[int, tuple[Pose, np.ndarray]],
         if up >= 0:
             ours.append(pose.position - places[up][0].position)
             theirs.append(bind[:3, 3] - places[up][1][:3, 3])
-    return np.reshape(ours, (-1, 3)), np.reshape(theirs, (-1, 3))
+    if not ours:
+        # Of bones without parents from the origin, which is the same in both.
+        ours = [pose.position for pose, _ in places.values()]
+        theirs = [bind[:3, 3] for _, bind in places.values()]
+    return np.array(ours), np.array(theirs)
 
 
 def _scale(edges: np.ndarray, originals: np.ndarray) -> float:
