@@ -12,6 +12,7 @@ import fit_rigs
 import numpy as np
 import pytest
 from animated_rigs import rate, worlds_at
+from test_fit_rigid import PERSON, parts
 
 from ragdoll_ros import Placement, Scene, Simulation, load_scene, save_scene
 from ragdoll_ros.files.animation import load_animations
@@ -289,6 +290,23 @@ def test_an_animation_that_stands_still_is_the_bind_pose(tmp_path, name, unit):
     path.write_bytes(made.glb())
     fit = fit_character(read_character(path, 1 / unit), FitOptions(smallest=0.2))
     assert_bind_pose(load_animations(fit.placed(str(path)).doll)['move'].at(0.5))
+
+
+@pytest.mark.parametrize('pivots', [False, True])
+def test_rigid_parts_without_a_skin_are_moved_too(tmp_path, pivots):
+    """An arm of a robot of meshes: 0.4 rad about the axis across it."""
+    made, arm = parts(pivots), 'J_Bip_L_UpperArm'
+    animated_rigs.animate(made, PERSON, {arm: lambda time: (STILL, np.array((0, 0, -0.4 * time)))},
+                          (0, 1))
+    path = tmp_path / 'robot.glb'
+    path.write_bytes(made.glb())
+    fit = fit_character(read_character(path), FitOptions(smallest=0.2))
+    animation = load_animations(fit.placed(str(path)).doll)['move']
+    assert_bind_pose(animation.at(0.0))
+    found = animation.at(1.0)
+    angles = {name: angle for name, angle in found.angles.items() if abs(angle) > 1e-6}
+    assert angles == {f'{arm}_x': pytest.approx(-0.4, abs=1e-6)}
+    assert max(found.distances.values()) < 1e-6
 
 
 def assert_bind_pose(motion):
