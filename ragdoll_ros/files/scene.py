@@ -109,11 +109,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
             doll, more = _with_swings(doll, entry, path)
             found += [error.at(where) for error in more]
         if doll is not None and not has_error_under(found, where):
-            first = try_build(found, where, _placement, doll, entry)
-            copies = repeated(first, entry['repeat']) if first and 'repeat' in entry else [first]
-            if first and 'animation' in entry:
-                copies = try_build(found, where, _animated, copies, entry) or []
-            placements += copies
+            placements += try_build(found, where, _copies, doll, entry) or []
         if len(placements) > MOST_DOLLS:
             found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
             break
@@ -170,6 +166,13 @@ def scene_data(scene: Scene, folder: Path | None = None,
 def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
     """YAML of a scene for a file in ``folder``."""
     return yaml_text.to_text(scene_data(scene, folder), 'scene', head)
+
+
+def _copies(doll: Ragdoll, entry: dict) -> list[Placement]:
+    """The doll as an entry of the scene places, repeats and animates it."""
+    first = _placement(doll, entry)
+    copies = repeated(first, entry['repeat']) if 'repeat' in entry else [first]
+    return _animated(copies, entry) if 'animation' in entry else copies
 
 
 def _placement(doll: Ragdoll, entry: dict) -> Placement:
