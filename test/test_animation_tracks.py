@@ -178,3 +178,35 @@ def test_too_many_keys_are_refused(tmp_path, monkeypatch):
 
     with pytest.raises(ModelError, match='6 keys'):
         read_animations(written(tmp_path, change, times, turns))[0].tracks  # noqa: B018
+
+
+@pytest.mark.parametrize('time', [0.0, 0.02, 0.31, 0.5, 0.96, 1.0])
+def test_linear_keys_at_equal_steps_are_samples_of_a_smooth_motion(tmp_path, time):
+    """Of a turn to and fro: amid them to order 3, at their ends to order 2 of steps of 1/30 s."""
+    times = np.arange(31) / 30
+
+    def turn(at):
+        angle = 0.8 * math.sin(5 * at)
+        return np.array((math.sin(angle / 2), 0, 0, math.cos(angle / 2)))
+
+    keys = np.array([turn(at) for at in times]) * (-1.0) ** (np.arange(31) // 7)[:, None]
+    animation, = read_animations(written(tmp_path, times=times, turns=keys))
+    value, found = animation.tracks[0, 'rotation'].at(time)
+    speed = 0.8 * 5 * math.cos(5 * time)
+    spin = 2 * rotation.multiply(found, rotation.inverse(value))[:3]
+    tolerance = 1e-3 if 0.1 < time < 0.9 else 0.05
+    assert spin == pytest.approx((speed, 0, 0), abs=tolerance)
+    assert rotation.angle_between(value, turn(time)) < tolerance / 30
+
+
+@pytest.mark.parametrize('times', [(0, 0.05, 0.1, 0.15, 0.3), (0, 0.2, 0.4, 0.6, 0.8),
+                                   (0, 0.05, 0.1, 0.15)])
+def test_other_linear_keys_have_the_speed_of_the_chord(tmp_path, times):
+    """Of unequal steps, of long ones, and of too few for a difference of order 4."""
+    turns = [rotation.from_axis_angle((1, 0, 0), angle) for angle in np.square(times)]
+    animation, = read_animations(written(tmp_path, times=times, turns=turns))
+    value, found = animation.tracks[0, 'rotation'].at(0.07)
+    first = np.searchsorted(times, 0.07) - 1
+    speed = times[first] + times[first + 1]
+    assert 2 * rotation.multiply(found, rotation.inverse(value))[0] == pytest.approx(
+        speed, abs=1e-5)
