@@ -317,6 +317,46 @@ def assert_bind_pose(motion):
     assert max(motion.distances.values()) < 1e-6
 
 
+def with_track(tmp_path, path, values):
+    """The doll's motion at the middle of a track of two keys of its left arm."""
+    made = animated_rigs.document(RIG)
+    clock = made.accessor([[0.0], [1.0]], 'f4', 'SCALAR')
+    output = made.accessor(values, 'f4', f'VEC{len(values[0])}')
+    node = 2 + [bone.name for bone in RIG.bones].index('LeftArm')
+    made.data['animations'] = [{
+        'samplers': [{'input': clock, 'output': output}],
+        'channels': [{'sampler': 0, 'target': {'node': node, 'path': path}}]}]
+    file = tmp_path / 'track.glb'
+    file.write_bytes(made.glb())
+    fit = fit_character(read_character(file), FitOptions(smallest=0.2))
+    return load_animations(fit.placed(str(file)).doll)['animation_0'].at(0.5)
+
+
+@pytest.mark.parametrize('size', [0.0, 1e-30, 1e-3])
+def test_a_bone_that_is_scaled_to_nothing_can_be_placed(tmp_path, size):
+    """As games hide a hand."""
+    found = with_track(tmp_path, 'scale', [(size,) * 3] * 2)
+    assert np.isfinite([*found.angles.values(), *found.rates.values(), *found.velocity]).all()
+
+
+def test_a_bind_pose_without_a_size_is_refused(tmp_path):
+    made = animated_rigs.document(dataclasses.replace(RIG, binds=False))
+    animated_rigs.animate(made, RIG, MOVES['swing'], (0, 1))
+    file = tmp_path / 'twin.glb'
+    file.write_bytes(made.glb())
+    doll = fit_character(read_character(file), FitOptions(smallest=0.2)).doll
+    hand = 2 + [bone.name for bone in RIG.bones].index('LeftArm')
+    made.data['nodes'][hand]['scale'] = [0, 0, 0]
+    file.write_bytes(made.glb())
+    with pytest.raises(WrongForm, match=r'riders: .*LeftArm.*; expected a bone with a scale'):
+        load_animations(dataclasses.replace(doll, model=str(file)))
+
+
+def test_a_bone_beyond_all_numbers_is_refused(tmp_path):
+    with pytest.raises(OutOfRange, match=r'LeftArm.*; expected transforms of'):
+        with_track(tmp_path, 'scale', [(3e38,) * 3] * 2)
+
+
 def test_nodes_with_a_matrix_are_animated_too(tmp_path, plain):
     """Against the specification, but programs draw them."""
     rig = dataclasses.replace(fit_rigs.RIGS['centimetres'], name='matrices', unit=1.0)

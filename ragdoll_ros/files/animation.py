@@ -24,6 +24,12 @@ from .gltf.gltf_file import GltfFile
 from .gltf.nodes import TO_ROS, Nodes, read_nodes
 from .gltf.tracks import NodeAnimation, read_animations
 
+SMALLEST = 1e-30
+"""Determinant of a bind pose, as of inverse bind matrices."""
+
+LARGEST = 1e9
+"""Of a transform in m, and of its rate, above which an animation is broken."""
+
 
 @dataclass(frozen=True)
 class _File:
@@ -72,11 +78,16 @@ class Animation:
         for a broken track.
         """
         errors.check_range('time', time, 0.0, self.duration)
-        worlds, rates = self._source.animations[self.name].worlds(self._source.nodes, time)
+        # Overflow shows in the results, which are checked.
+        with np.errstate(over='ignore', invalid='ignore'):
+            both = np.array(self._source.animations[self.name].worlds(self._source.nodes, time))
         motions = {}
         for carrier in self._carriers:
-            moved, rate = (self._to_doll @ each[carrier.node] @ carrier.from_bind
-                           for each in (worlds, rates))
+            moved, rate = self._to_doll @ both[:, carrier.node] @ carrier.from_bind
+            largest = max(np.abs(moved).max(), np.abs(rate).max())
+            if not largest < LARGEST:
+                raise errors.OutOfRange(f'{self.name}.{carrier.body}', float(largest),
+                                        f'transforms of at most {LARGEST:g}, m, and per s')
             place = np.append(carrier.pose.position, 1.0)
             orientation = rotation.multiply(rotation.nearest_rotation(moved[:3, :3]),
                                             carrier.pose.orientation)
@@ -125,7 +136,7 @@ def load_animations(doll: Ragdoll) -> dict[str, Animation]:
         Animations by their names, in the order of the file.
 
     Raises:
-        WrongForm: for a doll without a character.
+        WrongForm: for a doll without a character, or a bone whose bind pose has no size.
         UnknownBone: if the file has not the bones of the doll's riders.
         ModelErrors: if the file cannot be read.
 
@@ -245,6 +256,8 @@ def _carriers(doll: Ragdoll, bones: Bones, to_doll: np.ndarray) -> tuple[Carrier
         rider = _rider_of(doll, body)
         bone = index[rider.name]
         bind = bones.bind_matrices[bone]
+        if not abs(np.linalg.det(to_doll @ bind)) > SMALLEST:
+            raise errors.WrongForm('riders', rider.name, 'a bone with a scale in its bind pose')
         pose = doll.bone(body).pose
         if np.linalg.det(bind[:3, :3]) > 0:
             # A limb of the doll may have been moved; of a mirrored bone the axes are not unique.

@@ -134,16 +134,16 @@ def nearest_rotation_spin(changed: ArrayLike, rate: ArrayLike) -> np.ndarray:
     """Angular velocity (3,) of nearest_rotation() of a matrix A (3, 3), outer axes.
 
     ``rate`` is dA/dt. With A = R P, P symmetric, and the spin w in the body's axes,
-    skew(R^T dA/dt - its transpose) = [w] P + P [w] = [(trace(P) - P) w]. Singular where the
-    nearest rotation is not unique.
+    R^T dA/dt - its transpose = [w] P + P [w] = [(trace(P) - P) w]. Where the nearest rotation is
+    not unique, as of zero, the smallest of all.
     """
     r = matrix(nearest_rotation(changed))
     stretch = r.T @ np.asarray(changed, float)
     turned = r.T @ np.asarray(rate, float)
     odd = turned - turned.T
-    body = np.linalg.solve(np.trace(stretch) * np.eye(3) - (stretch + stretch.T) / 2,
-                           (odd[2, 1], odd[0, 2], odd[1, 0]))
-    return r @ body
+    body = np.linalg.lstsq(np.trace(stretch) * np.eye(3) - (stretch + stretch.T) / 2,
+                           np.array((odd[2, 1], odd[0, 2], odd[1, 0])), rcond=None)
+    return r @ body[0]
 
 
 def from_axis_angle(axis: ArrayLike, angle: float) -> np.ndarray:
