@@ -162,6 +162,14 @@ def test_a_broken_channel_is_named(tmp_path, place, channel):
     assert caught.value.path == place
 
 
+@pytest.mark.parametrize('path', ['pointer', ['rotation'], None])
+def test_a_channel_that_moves_no_node_is_left_out(tmp_path, path):
+    """Of morph targets, of extensions, and of nothing."""
+    file = written(tmp_path, lambda data: data['animations'][0]['channels'][0].update(
+        target={'node': 0, 'path': path}))
+    assert read_animations(file) == []
+
+
 def test_a_file_without_animations_has_none(tmp_path):
     assert read_animations(written(tmp_path, lambda data: data.pop('animations'))) == []
 

@@ -176,7 +176,7 @@ def _node_channels(entry: dict, where: str) -> list[tuple[dict, dict, str]]:
     found = []
     for number, channel in enumerate(get_objects(entry, 'channels', where)):
         target = get_container(channel, 'target', dict, f'{where}.channels[{number}]')
-        if target.get('path') in PROPERTIES and target.get('node') is not None:
+        if target.get('path') in tuple(PROPERTIES) and target.get('node') is not None:
             found.append((channel, target, f'{where}.channels[{number}]'))
     return found
 
