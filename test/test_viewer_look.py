@@ -154,7 +154,7 @@ def test_a_force_is_seen_with_its_newtons_though_a_body_is_before_it(seen):
     page.source.pause(True)
     view.key('h')
     # Tick by tick until something presses: it may have been stopped between two impacts.
-    label = view.wait(lambda: page.server.scene.get_handle_by_name('/scene/newtons/0')
+    label = view.wait(lambda: page.server.scene.get_handle_by_name('/scene/newtons_labels/0')
                       or page.source.step())
     assert label.text.endswith(' N')
 
