@@ -74,7 +74,7 @@ def follow_motions(doll: Ragdoll, motions: Mapping[str, BoneMotion]) -> Followed
 
 
 def _followed(doll: Ragdoll, motions: Mapping[str, BoneMotion], angles: dict[str, float],
-                 rates: dict[str, float], clipped: tuple[str, ...]) -> FollowedMotion:
+              rates: dict[str, float], clipped: tuple[str, ...]) -> FollowedMotion:
     root = motions[doll.root.name]
     pose = Pose(root.position - rotation.rotate(root.turn, doll.root.position), root.turn)
     within = bone_motions(doll, angles, rates)
