@@ -1,9 +1,11 @@
 """Simulate a fall from its start and record its frames."""
+import functools
 from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from ..files.limits import load_limits
+from ..model.biomechanical_limits import BiomechanicalLimits
 from ..model.coordinates import GeneralizedState
 from ..model.errors import RagdollError
 from ..people import standing
@@ -23,9 +25,15 @@ def generate(recipe: Recipe, falls: Iterable[int]) -> Iterator[Fall]:
         yield simulate(recipe, start_of(recipe, number))
 
 
+@functools.cache
+def _limits() -> BiomechanicalLimits:
+    """Those of all falls, read once a process."""
+    return load_limits()
+
+
 def simulate(recipe: Recipe, start: Start) -> Fall:
     """Simulate the fall that begins at ``start``."""
-    scene, frames, limits = start.scene, _Recorder(recipe, start), load_limits()
+    scene, frames, limits = start.scene, _Recorder(recipe, start), _limits()
     impacts = WorstImpacts.none_yet(scene, limits)
     # Not 'auto': falls must not depend on which engines are installed.
     with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
