@@ -197,11 +197,15 @@ class View:
 
     def hold_at(self, scene, start):
         """Pause at the start, where the bones are at (n, 3) m, as the page draws it."""
-        if self.button('Pause').count():
-            self.key(' ')
-            self.button('Play').wait_for()
-        self.key('r')
-        self.wait(lambda: abs(self.bodies(scene) - start).max() < 1e-6)
+        def held():
+            if self.button('Pause').count():  # what was done before may have it go on only now
+                self.press('Pause')
+                self.button('Play').wait_for()
+                self.press('Reset')
+            return abs(self.bodies(scene) - start).max() < 1e-6
+
+        self.press('Reset')
+        self.wait(held)
 
     def button(self, name):
         return self.page.get_by_role('button', name=name, exact=True)

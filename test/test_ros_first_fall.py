@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import time
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from browser import chromium, opened, serving
 from geometry_msgs.msg import PoseArray, Wrench
 from peer import listening
+from std_msgs.msg import String
 
 from ragdoll_ros.files.scene import load_scene
 
@@ -64,9 +66,10 @@ def peer(ros):
 
 @pytest.fixture(scope='module')
 def heard(peer):
-    """Poses and forces of a node that simulates a doll in free space, as they came."""
-    return peer.collect(PoseArray, '/free/ragdoll/poses'), peer.collect(Wrench,
-                                                                        '/free/ragdoll/force')
+    """Poses, forces and events of a node that simulates a doll in free space, as they came."""
+    return (peer.collect(PoseArray, '/free/ragdoll/poses'),
+            peer.collect(Wrench, '/free/ragdoll/force'),
+            peer.collect(String, '/free/ragdoll/events'))
 
 
 @pytest.fixture(scope='module', params=['desk', pytest.param('phone', marks=pytest.mark.slow)])
@@ -92,10 +95,12 @@ def pushed(view, heard):
 
     A push is over when a force of zero was heard, and ten poses after it.
     """
-    poses, forces = heard
-    view.key('r')
-    view.page.wait_for_timeout(300)
-    view.wait(lambda: len(poses) > 11 and np.abs(velocity(poses)).max() < 1e-9)
+    poses, forces, events = heard
+    events.clear()
+    view.press('Reset')
+    view.wait(lambda: any(json.loads(message.data)['kind'] == 'reset' for _, message in events))
+    count = len(poses)
+    view.wait(lambda: len(poses) > count + 11 and np.abs(velocity(poses)).max() < 1e-9)
     forces.clear()
     result = []
     yield result

@@ -66,7 +66,7 @@ def place(view, page, heard, azimuth, distance=5.0):
     """Reset, and look at the doll from ``azimuth`` rad to its left; wait until the server knows."""
     poses, _, events = heard
     events.clear()
-    view.key('r')
+    view.press('Reset')  # not R: a page that is just there may not hear keys yet
     view.wait(lambda: events_of(events, 'reset'))
     eye = CENTER + distance * np.array((math.cos(azimuth), math.sin(azimuth), 0.2))
 

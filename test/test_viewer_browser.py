@@ -408,7 +408,7 @@ def test_a_body_is_dragged_by_its_handle(view, height):
     view.key('Control+z')
     view.wait(lambda: abs(view.bodies(SCENE) - START).max() < 1e-6)
     view.key('h')
-    view.press('Run')  # else R, with which the next test resets, would choose how handles act
+    view.press('Run')
     view.page.locator('.ragdoll-edit-banner').wait_for(state='hidden')
 
 
