@@ -85,7 +85,7 @@ class Outputs:
         self._templates, self._frame = prepared.templates, frame
         self._set_swings_publisher(count_masses(scene) > 0)
         self._next_markers = 0
-        self._pending: list[Callable[[Simulation, int], None]] = []
+        self._pending = [publish for topic, publish in self._latched_topics if topic is not None]
         """What has not published the last tick, for want of subscribers."""
         self._tf.set_scene(scene, frame, publish_tf, prepared.tf)
         self.humans.set_scene(prepared.humans, frame, publish_tf)
@@ -143,14 +143,19 @@ class Outputs:
             self._next_markers = now + MARKER_PERIOD
             self._publish_markers(simulation, stamp)
         self._pending = []
-        for topic, publish in ((self._measures, self._publish_measures),
-                                   (self._swings, self._publish_swings),
-                                   (self._poses, self._publish_poses)):
+        for topic, publish in self._latched_topics:
             if topic is not None and (paused or topic.has_subscribers):
                 publish(simulation, stamp)
             elif topic is not None:
                 topic.forget()
                 self._pending.append(publish)
+
+    @property
+    def _latched_topics(self) -> tuple[tuple[
+            LatchedTopic | None, Callable[[Simulation, int], None]], ...]:
+        """What late listeners get of each tick, and what publishes it; poses last."""
+        return ((self._measures, self._publish_measures), (self._swings, self._publish_swings),
+                (self._poses, self._publish_poses))
 
     def publish_on_pause(self, simulation: Simulation, stamp: int) -> None:
         """On pause, publish the pending messages to the latched topics for late subscribers."""
