@@ -101,6 +101,11 @@ def test_what_is_wrong_or_missing_is_told_before_anything_starts(wrong, told):
     assert str(caught.value) == told
 
 
+def test_a_scene_that_is_not_there_is_told_before_anything_starts():
+    with pytest.raises(InvalidLaunchArguments, match='(?s)^scene:=nowhere: .*drop'):
+        node_parameters(given(scene='nowhere'), lambda package: True)
+
+
 def test_all_faults_are_told_at_once():
     with pytest.raises(InvalidLaunchArguments) as caught:
         node_parameters(given(rate='x', pace='y', rviz='z'), lambda package: True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
+from ...files.scene import load_scene
 from ...model import errors
 from .node_settings import SPECS
 
@@ -42,6 +43,11 @@ def node_parameters(given: dict[str, str], is_installed: Callable[[str], bool]) 
             values[name] = _number(name, text, found)
         else:
             values[name] = _boolean(name, text, found)
+    if values['scene']:
+        try:
+            load_scene(values['scene'])
+        except errors.RagdollError as error:
+            found.append(f'scene:={values["scene"]}: {error}')
     if values['params_file'] and not os.path.isfile(values['params_file']):
         found.append(f'params_file:={values["params_file"]}: expected a parameter file')
     if values['params_file'] and values['robot_state_publisher'] and not values['scene']:
