@@ -109,16 +109,18 @@ class Soak:
         """Make all ticks. Returns the samples."""
         samples, begin = [SoakSample.now()], time.monotonic()
         done = {'reset': 0, 'change': 0, 'sample': 0, 'push': 0}
-        while self._node.ticks < self._ticks:
+        # Ticks are also made while a scene is loaded: the last sample comes after the last one.
+        while done['sample'] < SAMPLES:
             self._executor.spin_once(timeout_sec=1.0)
-            share = self._node.ticks / self._ticks
+            # One wake-up may make several ticks, and the last one too many.
+            share = min(self._node.ticks / self._ticks, 1.0)
             for name, count, act in (('reset', RESETS, self._node.reset),
                                      ('change', CHANGES, self._change),
                                      ('push', self._ticks * PUSH_RATE, self._push)):
                 if done[name] < int(share * count):
                     done[name] += 1
                     act()
-            if done['sample'] < int(share * SAMPLES):
+            while done['sample'] < int(share * SAMPLES):
                 done['sample'] += 1
                 samples.append(SoakSample.now())
                 _print_progress(share, samples[-1], time.monotonic() - begin)
