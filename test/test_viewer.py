@@ -265,9 +265,9 @@ def test_another_engine_by_the_dropdown(page):
     """The scene starts anew in it; and another scene begins in the same."""
     client = page.open()
     wait(lambda: page.stage and page.frame and page.frame.time > 0.2)
-    scene = page.frame.scene
+    scene, run = page.frame.scene, page.frame.run
     client.update(page.controls.engine, 'bullet')
-    wait(lambda: page.source.status.engine == 'bullet' and page.frame.time < 0.2)
+    wait(lambda: page.source.status.engine == 'bullet' and page.frame.run != run)
     assert page.frame.scene is scene
     client.update(page.controls.scene, 'flight')
     wait(lambda: page.stage.scene.name == 'flight')

@@ -73,7 +73,7 @@ class Ticker:
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
         self._pacer, self._running = Pacer(1.0, 0), False
-        self._ticks_per_wake, self._last_made = 1, 0
+        self._ticks_per_wake = 1
         self._throttles = {interval: PollThrottle(interval)
                            for interval in (SERVICE_INTERVAL, QOS_EVENT_INTERVAL)}
         self._timer = node.create_timer(1.0, self._on_timer, clock=steady)
@@ -157,16 +157,12 @@ class Ticker:
         for throttle in self._throttles.values():
             throttle.wake(woken)
         end, dropped = woken + MAX_CALLBACK_TIME, self._pacer.dropped_time
-        made, early = 0, 0.5
-        if woken - self._last_made < self._timer.timer_period_ns - TIMER_ROUNDING:
-            # The last tick was late, and may have been this wake-up's: the next one before it is
-            # due would have a stamp in the future, as would a second one.
-            early = min(early, TIMER_ROUNDING / self._pacer.period)
+        # A tick that is made before it is due has a stamp in the future.
+        made, early = 0, min(0.5, TIMER_ROUNDING / self._pacer.period)
         while made < self._max_ticks:
             now = time.monotonic_ns()
             if now > end or not self._pacer.due(now, 0.0 if made else early):
                 break
-            self._last_made = now
             self._tick(self._pacer.last_due)
             made += 1
         if self._pacer.dropped_time != dropped:
