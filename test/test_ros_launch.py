@@ -102,7 +102,7 @@ def test_what_is_wrong_or_missing_is_told_before_anything_starts(wrong, told):
 
 
 def test_a_scene_that_is_not_there_is_told_before_anything_starts():
-    with pytest.raises(InvalidLaunchArguments, match='(?s)^scene:=nowhere: .*drop'):
+    with pytest.raises(InvalidLaunchArguments, match=r'(?s)^scene:=nowhere: .*drop'):
         node_parameters(given(scene='nowhere'), lambda package: True)
 
 
