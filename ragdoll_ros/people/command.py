@@ -13,6 +13,7 @@ EXAMPLE = """\
 examples:
   ragdoll_person --height 1.62 --mass 67 --sex female -o person.yaml
   ragdoll_person --sex male --percentile 95 -o large.yaml
+  ragdoll_person --sex female --passive -o soft_joints.yaml
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=person.yaml
 
 Masses, centres and inertias are de Leva's of 1996 (J Biomech 29:1223); the percentiles ANSUR II's.
@@ -20,7 +21,7 @@ Exit code 0: done; 2: an option is wrong, or the file cannot be written."""
 
 HEAD = """\
 A person as a doll: {sex}, {height:g} m, {mass:g} kg; soles on z = 0.
-Written by: ragdoll_person --height {height:g} --mass {mass:g} --sex {sex}
+Written by: ragdoll_person --height {height:g} --mass {mass:g} --sex {sex}{passive}
 Masses, centres of mass and inertias: de Leva 1996. Shapes: lengths, and girths of ANSUR II."""
 
 
@@ -31,8 +32,9 @@ def main(arguments: list[str] | None = None) -> int:
         average = standard(options.sex, options.percentile)
         height = average[0] if options.height is None else options.height
         mass = average[1] if options.mass is None else options.mass
-        doll = person(height, mass, options.sex, Path(options.output).stem)
-        save_doll(doll, options.output, HEAD.format(sex=options.sex, height=height, mass=mass))
+        doll = person(height, mass, options.sex, Path(options.output).stem, options.passive)
+        save_doll(doll, options.output, HEAD.format(
+            sex=options.sex, height=height, mass=mass, passive=' --passive' * options.passive))
     except errors.RagdollError as error:
         print(f'ragdoll_person: --{error}', file=sys.stderr)
         return 2
@@ -41,6 +43,9 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     print(f'{doll}, {height:g} m tall, {options.sex}')
     print(_table(doll))
+    if options.passive:
+        print(f'passive torques: {_angles(doll, True)}')
+        print(f'none known, hard limits: {_angles(doll, False)}')
     print(f'written to {options.output}')
     return 0
 
@@ -57,9 +62,18 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--percentile', type=int, choices=PERCENTILES['male'], default=50,
                         help='percentile of US soldiers for height and mass if not given '
                              '(default 50)')
+    parser.add_argument('--passive', action='store_true',
+                        help='elastic torques of tissue at hips, knees, ankles and trunk in place '
+                             'of hard limits; only the engine rigid has them')
     parser.add_argument('-o', '--output', metavar='DOLL.yaml', default='person.yaml',
                         help='output file (default person.yaml)')
     return parser
+
+
+def _angles(doll: Ragdoll, passive: bool) -> str:
+    """Names of the joint angles with a passive torque, or of those without; of limbs the left."""
+    return ', '.join(name for joint in doll.joints if not joint.child.startswith('right_')
+                     and bool(joint.passive) == passive for name in joint.angle_names)
 
 
 def _table(doll: Ragdoll) -> str:

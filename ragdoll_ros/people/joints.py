@@ -7,13 +7,13 @@ negative at hips and elbows, positive at knees and neck.
 Ranges are the norms of the American Academy of Orthopaedic Surgeons (Joint Motion: Method of
 Measuring and Recording, 1965), of the trunk half at the waist, half at the chest. Abduction of an
 arm ends at 85 degrees, the limit of ball joints here; it goes higher by its pitch. Within the range
-there is only damping: passive torques that grow exponentially near its ends (Anderson 1999 as used
-by Falisse 2019) are replaced by the limits.
+there is only damping, and passive torques on request.
 """
 import math
 
 from ..model.anthropometry import MEN
 from ..model.ragdoll import Joint, Limits
+from .passive import with_passive_torques
 from .places import SIDES, Places
 
 DAMPING = 0.1
@@ -26,8 +26,10 @@ MEAN_MASS = 73.0
 FORWARDS, LEFT, UP, DOWN = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)
 
 
-def joints(at: Places, height: float, mass: float) -> tuple[Joint, ...]:
-    """All 15 joints of a person with the landmarks ``at``."""
+def joints(at: Places, height: float, mass: float, passive: bool = False) -> tuple[Joint, ...]:
+    """All 15 joints of a person with the landmarks ``at``; ``passive``: with the torques of tissue
+    where these are known, see passive.py.
+    """
     damping = DAMPING * (mass / MEAN_MASS) * (height / MEN.height) ** 2
 
     def spine(parent: str, child: str, z: float, names: tuple[str, str, str],
@@ -44,6 +46,8 @@ def joints(at: Places, height: float, mass: float) -> tuple[Joint, ...]:
         spine('chest', 'head', at.sternum, ('r_head', 'p_head', 'y_head'), 45, (-45, 45), 60)]
     for side, left in SIDES.items():
         found += _arm(side, left, at, damping) + _leg(side, left, at, damping)
+    if passive:
+        found = [with_passive_torques(joint, damping / DAMPING) for joint in found]
     return tuple(found)
 
 

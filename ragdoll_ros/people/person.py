@@ -48,7 +48,8 @@ def standard(sex: str, percentile: int = 50) -> tuple[float, float]:
     return PERCENTILES[sex][percentile]
 
 
-def person(height: float, mass: float, sex: str, name: str = 'person') -> Ragdoll:
+def person(height: float, mass: float, sex: str, name: str = 'person',
+           passive: bool = False) -> Ragdoll:
     """The doll of an adult, standing, by de Leva's anthropometric tables.
 
     Args:
@@ -56,6 +57,8 @@ def person(height: float, mass: float, sex: str, name: str = 'person') -> Ragdol
         mass: kg, 15 to 160.
         sex: 'female' or 'male'.
         name: of the doll.
+        passive: whether hips, knees, ankles and trunk have the elastic torques of tissue, in place
+            of hard limits at the ends of their ranges (engine rigid).
 
     Returns:
         A doll of 16 bones, soles on z = 0.
@@ -77,7 +80,7 @@ def person(height: float, mass: float, sex: str, name: str = 'person') -> Ragdol
         segment = sample.segments[part]
         bones.append(_bone(bone, part, segment, segment.length / sample.height * height,
                            share[part] * mass, at))
-    return Ragdoll(name, tuple(bones), joints(at, height, mass))
+    return Ragdoll(name, tuple(bones), joints(at, height, mass, passive))
 
 
 def standing(doll: Ragdoll) -> dict[str, tuple[float, float]]:

@@ -1,0 +1,69 @@
+"""Passive elastic torques of a person's joints.
+
+Coefficients of Anderson (1999) as published with Falisse et al. 2019 (J R Soc Interface
+16:20190402, github.com/antoinefalisse/3dpredictsim), here with the signs of joints.py. They are
+those of a man of the table's mass and height, and scale with mass times height squared, as his
+damping does. Of the trunk, the source has one joint, at the lumbar spine; waist and chest are two
+in series, each with half the angle at the same torque. Shoulders, elbows, wrists and neck have none
+in that source.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from ..model.passive import Passive, PassiveEnd
+from ..model.ragdoll import Joint
+
+GUARD_TORQUE = 200.0
+"""N m of the table's man. Where a passive torque reaches it, beyond what a joint bears, the hard
+limit lies: it guards what the torque alone would already have stopped."""
+
+
+def _ends(lower: tuple[float, float, float], upper: tuple[float, float, float],
+          joints: int = 1) -> Passive:
+    """Of torque, N m, angle, rad, and growth, 1/rad, shared by ``joints`` in series."""
+    return Passive(*(PassiveEnd(torque, angle / joints, 1 / (growth * joints))
+                     for torque, angle, growth in (lower, upper)))
+
+
+def _symmetric(torque: float, angle: float, growth: float, joints: int = 1) -> Passive:
+    return _ends((torque, -angle, growth), (torque, angle, growth), joints)
+
+
+_TRUNK = {'p': _ends((0.35, -0.17, 30.72), (0.25, math.radians(30), 20.36), joints=2),
+          'r': _symmetric(0.25, math.radians(20), 20.36, joints=2),
+          'y': _symmetric(0.25, math.radians(20), 20.36, joints=2)}
+
+TORQUES = {
+    'p_hip': _ends((2.44, -1.81, 5.05), (1.51, 0.6981, 21.88)),
+    'r_hip': _symmetric(0.03, 0.5, 14.94),
+    'y_hip': _symmetric(0.03, 0.92, 14.94),
+    'knee': _ends((6.09, -0.13, 33.94), (11.03, 2.4, 11.33)),
+    'p_ankle': _ends((2.03, -0.52, 38.11), (0.18, 0.74, 12.12)),
+    'r_ankle': _symmetric(60.21, 0.65, 16.32),
+    **{f'{axis}_{joint}' if axis != 'p' or joint == 'chest' else joint: torque
+       for joint in ('waist', 'chest') for axis, torque in _TRUNK.items()}}
+"""By the name of an angle without its side."""
+
+
+def with_passive_torques(joint: Joint, scale: float) -> Joint:
+    """A joint with the torques that its angles have in the source, times ``scale``, and with hard
+    limits beyond; the joint itself if it has none there.
+    """
+    # 'r_waist' is a roll, 'r_knee' the right one.
+    found = [TORQUES.get(name, TORQUES.get(name[2:])) for name in joint.angle_names]
+    if not any(found):
+        return joint
+    limits = tuple(limit if each is None else _guards(each)
+                   for each, limit in zip(found, joint.limits, strict=True))
+    return replace(joint, limits=limits, passive=tuple(
+        each and Passive(*(replace(end, torque=scale * end.torque)
+                           for end in (each.lower, each.upper))) for each in found))
+
+
+def _guards(passive: Passive) -> tuple[float, float]:
+    """Angles, rad, at which the torques are GUARD_TORQUE."""
+    low, high = (end.width * math.log(GUARD_TORQUE / end.torque)
+                 for end in (passive.lower, passive.upper))
+    return passive.lower.angle - low, passive.upper.angle + high
