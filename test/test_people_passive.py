@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from ragdoll_ros.falls import generate, load_recipe
+from ragdoll_ros.falls.recipe import recipe_of
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors
@@ -116,3 +118,13 @@ def test_a_person_with_them_falls_and_keeps_the_account():
         assert worst < 6e-3
     with pytest.raises(errors.RagdollError, match='passive'):
         Simulation(scene, engine='bullet')
+
+
+def test_people_of_a_recipe_have_them_on_request():
+    data = load_recipe('faint').data
+    for passive in (False, True):
+        groups = [{**group, 'passive': passive} for group in data['who']['people']]
+        recipe = recipe_of({**data, 'who': {'people': groups}, 'duration': 1.0})
+        fall, = generate(recipe, range(1))
+        joints = fall.scene.dolls[0].doll.joints
+        assert not fall.failure and any(joint.passive for joint in joints) == passive

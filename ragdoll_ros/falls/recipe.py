@@ -90,7 +90,8 @@ class Recipe:
         """The doll that falls; ``who`` is as returned by draw()."""
         if isinstance(who, int):
             return self.dolls[who]
-        return person(who['height'], who['bmi'] * who['height'] ** 2, who['sex'])
+        return person(who['height'], who['bmi'] * who['height'] ** 2, who['sex'],
+                      passive=who.get('passive', False))
 
     def draw(self, number: int) -> dict:
         """Draw the values of fall ``number``: the recipe's ``start``, ``pushes``, ``limp`` and
