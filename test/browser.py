@@ -249,6 +249,8 @@ def opened(browser, url, scene, size=SIZE, first=False):
     view = View(browser, url, size)
     try:
         view.wait(lambda: np.isfinite(view.bodies(scene)).all())
+        # The page hears keys once its panel is drawn, which a busy browser does later.
+        view.page.locator('.ragdoll-bar [data-do=toggle][aria-label]').wait_for()
         if first:
             before = view.bodies(scene)
             view.wait(lambda: abs(view.bodies(scene) - before).max() > 0.01)
