@@ -20,7 +20,7 @@ from ..model.ragdoll import Ragdoll
 from ..people import person, standard
 from ..people.fall_phases import ONSET_SPEED, REST_SPEED
 from .checks import RATE, angle_limits_deg, checked_mount, names_of, value_errors
-from .distribution import draw
+from .distribution import draw, shifted_means
 
 DEFAULTS = {
     'seed': 0, 'feet': [], 'start': {}, 'pushes': [], 'limp': [], 'ground': {}, 'accuracy': 'draft',
@@ -75,6 +75,12 @@ class Recipe:
         and ImuErrors.
         """
         return self.data['record']['imus']
+
+    @property
+    def warnings(self) -> list[str]:
+        """What its author may not have meant."""
+        return list(shifted_means({key: self.data[key] for key in DRAWN if key != 'seed'
+                                   and not (key == 'who' and 'dolls' in self.data[key])}))
 
     @cached_property
     def digest(self) -> str:
