@@ -114,7 +114,7 @@ def write_files(folder: Path, files: dict[str, bytes]) -> dict[str, str]:
 
 
 def differences(old: object, new: object, path: str = '') -> Iterator[tuple[str, str, str]]:
-    """Where JSON data differ: path, old value and new value, in JSON; ABSENT where there is none."""
+    """Where JSON data differ: path, old and new value in JSON; ABSENT where there is none."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in [*old, *(key for key in new if key not in old)]:
             yield from differences(old.get(key, ABSENT), new.get(key, ABSENT),
