@@ -344,13 +344,13 @@ def test_people_that_cannot_be_are_refused(who, path):
 def test_a_recipe_that_is_none_is_refused(tmp_path):
     with pytest.raises(ModelErrors):
         load_recipe('drop')
-    with pytest.raises(ModelErrors, match='a file, or one of faint, shove, tumble'):
+    with pytest.raises(ModelErrors, match=r'a file, or one of .*faint, shove, .*tumble'):
         load_recipe('faints')
     with pytest.raises(OutOfRange):
         recipe().draw(-1)
 
 
-@pytest.mark.parametrize('name', ['faint', 'shove', 'tumble'])
+@pytest.mark.parametrize('name', names_in(RECIPES))
 def test_shipped_recipes_make_falls(name):
     fall = next(generate(load_recipe(name), [0]))
     assert not fall.failure and fall.phases.impact is not None
