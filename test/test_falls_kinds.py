@@ -127,6 +127,17 @@ def test_walkers_fall_over_a_held_foot_and_behind_a_sliding_one(name, towards):
         assert abs((fall.direction - towards + 180) % 360 - 180) < 60
 
 
+@pytest.mark.slow
+def test_a_fifth_of_faints_and_more_go_forwards_backwards_and_to_the_sides():
+    shipped = load_recipe('faint')
+    # As long as it takes to the impact; the same falls.
+    made = recipe_of({**shipped.data, 'duration': 1.4})
+    assert made.draw(7) == shipped.draw(7)
+    quarters = [round(fall.direction / 90) % 4 for fall in generate(made, range(100))]
+    forwards, left, backwards, right = np.bincount(quarters, minlength=4)
+    assert min(forwards, backwards, left + right) >= 20
+
+
 def test_balls_have_no_feet_to_fall_from():
     fall = next(generate(recipe(who={'dolls': [BALL]}, start={
         'clearance': 0.1, 'velocity': [0, 1, 0], 'heading_deg': 40}), [0]))
