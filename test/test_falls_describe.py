@@ -9,7 +9,9 @@ from falls_recipes import SHOVE, recipe
 from ragdoll_ros.falls import describe, generate
 from ragdoll_ros.falls.command import main
 from ragdoll_ros.falls.dataset_summary import summarize
+from ragdoll_ros.falls.fall import fall_samples
 from ragdoll_ros.falls.manifest import build_dataset
+from ragdoll_ros.falls.peaks import Peaks
 from ragdoll_ros.falls.pictures import hull
 from ragdoll_ros.falls.shard import DatasetJob, make_shard
 from ragdoll_ros.people.real_falls import bones_of
@@ -99,6 +101,46 @@ def test_what_cannot_be_described_is_refused(tmp_path, thrown, capsys):
     build_dataset(DatasetJob(thrown, 1, 'amass'), tmp_path, here)
     assert main(['describe', str(tmp_path)]) == 2
     assert 'lerobot' in capsys.readouterr().err
+
+
+def test_a_peak_is_as_high_and_wide_as_it_is():
+    """Half-sines of known height and width at 1 kHz, over 1 g."""
+    time = np.arange(1000) / 1000
+    forces = []
+    for height, width in ((50.0, 0.06), (200.0, 0.03)):
+        pulse = np.where(abs(time - 0.5) < width / 2,
+                         height * np.cos((time - 0.5) / width * math.pi), 9.80665)
+        forces.append(np.stack([0 * time, pulse, 0 * time], axis=1))
+    forces[1][100:103] = [0, 0, -7 * 9.80665]
+    peaks = Peaks.of({'name': 'a', 'bone': 'b'}, [*forces, np.full((9, 3), np.nan)],
+                     np.array([0.47, 0.48, 0.1]), 0.001)
+    np.testing.assert_allclose(peaks.largest, [50 / 9.80665, 200 / 9.80665, np.nan])
+    # A half-sine is above half its height for two thirds of its width; to a sample at each end.
+    np.testing.assert_allclose(peaks.widths, [0.04, 0.02, np.nan], atol=0.002)
+    np.testing.assert_allclose(peaks.before_impact, [1, 7, np.nan])
+    assert peaks.share_early == 0.5
+
+
+def test_describe_prints_directions_and_peaks_and_warns_beyond_published_ranges(
+        tmp_path, capsys):
+    start = {'clearance': 0.5, 'velocity': [2, 0, 0]}
+    made = recipe({**SHOVE, 'start': start, 'pushes': [], 'duration': 0.8},
+                  record={'rate': 100, 'imu_rate': 200, 'imus': [
+                      {'name': 'low_back', 'bone': 'torso'}]})
+    build_dataset(DatasetJob(made, 3), tmp_path, here)
+    assert main(['describe', str(tmp_path)]) == 0
+    out, errors = capsys.readouterr()
+    assert 'directions: forwards 100%, to the left 0%' in out
+    forces = [np.linalg.norm(fall_samples(fall, 0)[:, :3], axis=1)
+              for fall in generate(made, range(3))]
+    middle = np.median([force.max() for force in forces]) / 9.80665
+    assert f'peaks at low_back: {middle:.1f} g in the median' in out
+    # The torso drops by half a metre and more.
+    warned = [line for line in errors.splitlines() if line.startswith('warning: ')]
+    peak, = (line for line in warned if 'peak acceleration' in line)
+    assert f'{middle:.1f}; real falls: 3 to 8 (' in peak and middle > 8
+    page = (tmp_path / 'README.md').read_text()
+    assert page.count('| **outside** |') == len(warned)
 
 
 def test_a_data_set_without_a_known_part_is_described(tmp_path):

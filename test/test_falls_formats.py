@@ -13,7 +13,7 @@ from ragdoll_ros import load_doll
 from ragdoll_ros.falls import generate, load_recipe
 from ragdoll_ros.falls.command import main
 from ragdoll_ros.falls.fall import fall_samples, samples_by_frame
-from ragdoll_ros.falls.formats.registry import FORMATS
+from ragdoll_ros.falls.formats.registry import FORMATS, resolve_format
 from ragdoll_ros.falls.formats.settled import ALIKE, different
 from ragdoll_ros.falls.manifest import build_dataset
 from ragdoll_ros.falls.shard import DatasetJob, make_shard
@@ -119,14 +119,20 @@ def test_bytes_name_pyarrows_version_and_nothing_of_the_machine(written):
     assert set(metadata.metadata) == {b'ARROW:schema', b'names'}
 
 
+def kfall_name(label):
+    """Path of the samples of a row of the first subject's labels."""
+    task = int(re.fullmatch(r'F\d\d \((\d+)\)', label['Task Code (Task ID)'])[1])
+    return f'sensor_data/SA000000/S000000T{task:02d}R{label["Trial ID"]:02d}.csv'
+
+
 def test_kfall_by_pandas(pandas, shoved, written):
     _, falls = shoved
     folder = written('kfall')
     labels = pandas.read_csv(folder / 'label_data/SA000000_label.csv')
     assert list(labels['Fall_onset_frame']) == [fall.phases.onset for fall in falls]
     assert list(labels['Fall_impact_frame']) == [fall.phases.impact for fall in falls]
-    for trial, fall in enumerate(falls, 1):
-        table = pandas.read_csv(folder / f'sensor_data/SA000000/S000000T01R{trial:02d}.csv')
+    for (_, label), fall in zip(labels.iterrows(), falls, strict=True):
+        table = pandas.read_csv(folder / kfall_name(label))
         assert list(table.columns) == ['TimeStamp(s)', 'FrameCounter', 'AccX', 'AccY', 'AccZ',
                                        'GyrX', 'GyrY', 'GyrZ', 'EulerX', 'EulerY', 'EulerZ']
         # Six digits behind the point.
@@ -145,6 +151,55 @@ def test_kfall_wants_a_sensor():
         DatasetJob(recipe(), 1, 'kfall')
     with pytest.raises(OutOfRange, match='lerobot'):
         DatasetJob(recipe(), 1, 'xml')
+
+
+# Quarters: forwards, to the left, backwards, to the right. KFall's table 2, SisFall's table 1.
+CODES = {'faint': ([28] * 4, [6] * 4), 'faint_sitting': ([25, 26, 27, 26], [13, 15, 14, 15]),
+         'trip': ([30] * 4, [4] * 4), 'slip': ([32, 33, 34, 33], [1, 3, 2, 3]),
+         None: ([30, 33, 34, 33], [4, 3, 2, 3])}
+
+
+@pytest.mark.parametrize('cause', CODES)
+def test_a_fall_has_the_codes_of_its_cause_and_direction(pandas, cause):
+    """Balls thrown to each side, twice; no two falls of a subject have the same name."""
+    made = recipe({**DROP, **({'cause': cause} if cause else {}), 'duration': 0.4}, start={
+        'clearance': 0.1, 'heading_deg': 70}, record={
+            'rate': 100, 'imu_rate': 200, 'imus': [{'name': 'a', 'bone': 'ball'}]})
+    falls = []
+    for number, towards in enumerate([0, 90, 180, 270] * 2):
+        angle = math.radians(towards)
+        made.data['start']['velocity'] = [math.cos(angle), math.sin(angle), 0.0]
+        falls += generate(made, [number])
+    kfall, sisfall = (resolve_format(name).shard_files(made, falls, 7)
+                      for name in ('kfall', 'sisfall'))
+    labels = pandas.read_csv(io.BytesIO(kfall['label_data/SA000007_label.csv']))
+    assert list(labels['Task Code (Task ID)']) == [
+        f'F{code - 19:02d} ({code})' for code in CODES[cause][0] * 2]
+    assert len(kfall) == len(sisfall) == 9
+    assert ('KFall' in labels['Description'][0]) == (cause is None)
+    names = pandas.read_csv(io.BytesIO(sisfall['labels/SA000007.csv']))['file']
+    assert [int(name[1:3]) for name in names] == CODES[cause][1] * 2
+    assert {f'SisFall_dataset/SA000007/{name}' for name in names} < set(sisfall)
+
+
+def test_sisfall_by_numpy(pandas, tmp_path):
+    made = recipe({**SHOVE, 'duration': 1.2, 'record': {'imu_rate': 200, 'imus': [IMU]}})
+    build_dataset(DatasetJob(made, 2, 'sisfall'), tmp_path, here)
+    labels = pandas.read_csv(tmp_path / 'labels/SA000000.csv')
+    for fall, (_, label) in zip(generate(made, range(2)), labels.iterrows(), strict=True):
+        path = tmp_path / 'SisFall_dataset/SA000000' / label['file']
+        counts = np.loadtxt(io.StringIO(path.read_text().replace(';', '')), delimiter=',')
+        # As in SisFall's read-me: value = count times twice the range over 2 ** bits.
+        units = np.repeat([2 * 16 / 2 ** 13, 2 * 2000 / 2 ** 16, 2 * 8 / 2 ** 14], 3)
+        samples = fall_samples(fall, 0)
+        force, rate = samples[:, :3] / 9.80665, np.degrees(samples[:, 3:])
+        expected = np.concatenate([np.clip(force, -16, 16 - units[0]), rate,
+                                   np.clip(force, -8, 8 - units[-1])], axis=1)
+        assert len(counts) == 2 * 119 + 1 and (counts == counts.round()).all()
+        np.testing.assert_allclose(counts, expected / units, rtol=0, atol=0.5 + 1e-9)
+        assert label['impact_sample'] == 2 * fall.phases.impact
+    with pytest.raises(WrongForm, match='200 for the format sisfall'):
+        DatasetJob(recipe({**SHOVE, 'record': {'imus': [IMU]}}), 1, 'sisfall')
 
 
 def test_mcap_by_mcap_ros2_support(shoved, written):
@@ -263,7 +318,7 @@ def test_states_that_are_alike_are_kept_once():
 
 
 def test_every_format_is_tested_here():
-    assert set(FORMATS) == {'lerobot', 'kfall', 'mcap', 'amass', 'settled'}
+    assert set(FORMATS) == {'lerobot', 'kfall', 'sisfall', 'mcap', 'amass', 'settled'}
 
 
 def test_a_sensor_in_free_fall_reads_nothing_and_at_rest_gravity():
@@ -367,8 +422,8 @@ def test_a_fast_sensor_has_several_samples_a_frame(pandas, tmp_path):
     velocity = np.cumsum(samples[1:, 2] - 9.8) / 1000
     np.testing.assert_allclose(velocity[9::10], fall.states[1:, 0, 9], atol=1e-9)
     files = make_shard(DatasetJob(made, 1, 'kfall'), 0).files
-    table = pandas.read_csv(io.BytesIO(files['sensor_data/SA000000/S000000T01R01.csv']))
     labels = pandas.read_csv(io.BytesIO(files['label_data/SA000000_label.csv']))
+    table = pandas.read_csv(io.BytesIO(files[kfall_name(labels.iloc[0])]))
     assert len(table) == 591 and table['TimeStamp(s)'].iloc[-1] == 0.59
     assert labels['Fall_impact_frame'][0] == 10 * fall.phases.impact == 250
     build_dataset(DatasetJob(made, 1), tmp_path, here)

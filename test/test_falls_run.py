@@ -16,7 +16,7 @@ import yaml
 from conftest import ROOT
 from falls_recipes import DROP, file_bytes, recipe
 
-from ragdoll_ros.falls.manifest import FILE, Manifest, build_dataset
+from ragdoll_ros.falls.manifest import FILE, Manifest, build_dataset, differences
 from ragdoll_ros.falls.pool import make_shards
 from ragdoll_ros.falls.shard import FALLS_PER_SHARD, DatasetJob, make_shard
 from ragdoll_ros.model.errors import Unreadable
@@ -191,6 +191,27 @@ def test_other_falls_are_not_mixed(job, tmp_path):
     build_dataset(DatasetJob(recipe(), 2), tmp_path, here, resume=True)
     with pytest.raises(Unreadable, match='2 or more'):
         build_dataset(DatasetJob(recipe(), 1), tmp_path, here, resume=True)
+
+
+def test_resuming_other_falls_says_what_differs(tmp_path):
+    base = {'name': 'thrown', 'start': {'clearance': {'uniform': [0.1, 0.5]}}}
+    build_dataset(DatasetJob(recipe(**base), 1), tmp_path, here)
+    other = recipe(name='thrown', seed=3, duration=0.7, feet=['ball'],
+                   start={'clearance': {'uniform': [0.1, 0.6]}})
+    with pytest.raises(Unreadable) as refused:
+        build_dataset(DatasetJob(other, 1, 'amass'), tmp_path, here, resume=True)
+    head, *told = str(refused.value).splitlines()
+    assert head.endswith('falls of the same recipe; these differ:')
+    assert sorted(line.strip() for line in told) == [
+        'format: "lerobot" there, "amass" now', 'recipe.duration: 0.6 there, 0.7 now',
+        'recipe.feet: [] there, ["ball"] now', 'recipe.seed: 0 there, 3 now',
+        'recipe.start.clearance.uniform[1]: 0.5 there, 0.6 now']
+
+
+def test_differences_name_keys_that_only_one_has():
+    old, new = {'a': {'b': 1, 'c': [1, 2]}, 'd': 0}, {'a': {'b': 1, 'e': None}, 'd': [0]}
+    assert list(differences(old, new)) == [
+        ('a.c', '[1, 2]', 'nothing'), ('a.e', 'nothing', 'null'), ('d', '0', '[0]')]
 
 
 def test_a_worker_that_is_killed_costs_its_shards_time(job, whole, tmp_path):

@@ -22,9 +22,11 @@ RANGES = {
     'start.heading_deg': TURN, 'start.lean_deg': (0, 180), 'start.lean_towards_deg': TURN,
     'start.clearance': (0, 100), 'start.velocity': (-100, 100), 'start.spin': (-100, 100),
     'start.other_angles': (0, 1), 'pushes.force': (0, 1e5), 'pushes.towards_deg': TURN,
-    'limp.at': (0, 600),
+    'start.walk.speed': (0.1, 3), 'limp.at': (0, 600), 'grabs.at': (0, 600),
+    'grabs.duration': (1e-3, 600),
     'pushes.upwards_deg': (-90, 90), 'pushes.at': (0, 600), 'pushes.duration': (1e-3, 600),
-    'ground.friction': (0, math.inf), 'ground.restitution': (0, 1), 'ground.slope_deg': (0, 45),
+    'ground.friction': (0, math.inf), 'ground.friction_under.*': (0, 100),
+    'ground.restitution': (0, 1), 'ground.slope_deg': (0, 45),
     'ground.downhill_deg': TURN, 'duration': (0.1, 600), 'record.rate': (5, 5000),
     'phases.onset_speed': (0, 10), 'phases.rest_speed': (0, 10)}
 """Smallest and largest admissible value by key, in the units of the schema."""
@@ -34,10 +36,10 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
     """Errors of the data beside those ``found`` so far; ``dolls`` are those it names."""
     more = [error for key, part in data.items() if not has_error_under(found, key)
             for error in distribution_errors(part, key)]
-    for check in (_out_of_range, _wrong_people, _wrong_limp, _wrong_rate, _wrong_imus):
+    for check in (_out_of_range, _wrong_people, _wrong_limp, _wrong_walk, _wrong_rate, _wrong_imus):
         more += list(check(data, [*found, *more]))
-    if dolls and not any(has_error_under([*found, *more], key)
-                         for key in ('feet', 'start', 'pushes', 'limp', 'record')):
+    if dolls and not any(has_error_under([*found, *more], key) for key in (
+            'feet', 'start', 'pushes', 'limp', 'grabs', 'ground', 'record')):
         more += _unknown_names(data, dolls)
     return more
 
@@ -70,7 +72,9 @@ def _out_of_range(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _values(data: object, key: str, path: str = '') -> Iterator[tuple[str, object]]:
-    """Paths in the data that match a key like ``pushes.force``, and their values."""
+    """Paths in the data that match a key like ``pushes.force``, and their values; ``*`` matches
+    every key.
+    """
     if isinstance(data, list):
         for index, part in enumerate(data):
             yield from _values(part, key, f'{path}[{index}]')
@@ -78,8 +82,8 @@ def _values(data: object, key: str, path: str = '') -> Iterator[tuple[str, objec
         yield path, data
     elif isinstance(data, dict):
         first, _, rest = key.partition('.')
-        if first in data:
-            yield from _values(data[first], rest, f'{path}.{first}' if path else first)
+        for name in data if first == '*' else [first] if first in data else []:
+            yield from _values(data[name], rest, f'{path}.{name}' if path else name)
 
 
 def _wrong_people(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
@@ -98,6 +102,18 @@ def _wrong_limp(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     who = data.get('who')
     if data.get('limp') and isinstance(who, dict) and 'people' not in who:
         yield errors.WrongForm('limp', 'dolls', 'people: only they can be held upright')
+
+
+def _wrong_walk(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """`walk` of dolls, or beside another motion at the start."""
+    start, who = data.get('start'), data.get('who')
+    if has_error_under(found, 'start') or not isinstance(start, dict) or 'walk' not in start:
+        return
+    if isinstance(who, dict) and 'people' not in who:
+        yield errors.WrongForm('start.walk', 'dolls', 'people: only they can walk')
+    for key in ('velocity', 'spin', 'tumbled'):
+        if key in start:
+            yield errors.WrongForm(f'start.{key}', start[key], 'none beside walk')
 
 
 def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
@@ -134,6 +150,10 @@ def _unknown_names(data: dict, dolls: list[Ragdoll]) -> Iterator[ModelError]:
     named = [(f'feet[{index}]', name) for index, name in enumerate(data.get('feet', ()))]
     named += [(f'pushes[{index}].bone', name) for index, push in enumerate(data.get('pushes', ()))
               for name in choices(push['bone'])]
+    named += [(f'grabs[{index}].bone', name) for index, grab in enumerate(data.get('grabs', ()))
+              for name in choices(grab['bone'])]
+    named += [(f'ground.friction_under.{name}', name)
+              for name in data.get('ground', {}).get('friction_under', ())]
     imus = data.get('record', {}).get('imus', ())
     named += [(f'record.imus[{index}].bone', mount['bone']) for index, mount in enumerate(imus)]
     for path, name in named:

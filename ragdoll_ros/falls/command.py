@@ -38,6 +38,8 @@ def main(arguments: list[str] | None = None) -> int:
     progress = ProgressLine(options.count)
     try:
         job = DatasetJob(load_recipe(options.recipe), options.count, options.format)
+        for warning in job.recipe.warnings:
+            print(f'warning: {warning}', file=sys.stderr)
         make = partial(pool.make_shards, workers=options.workers)
         if options.ray is not None:
             make = partial(cluster.make_shards, address=options.ray, workers=options.workers)

@@ -9,6 +9,7 @@ from ..people.fall_phases import part_impact
 from ..people.real_falls import bones_of
 from .formats.registry import resolve_format
 from .manifest import Manifest
+from .peaks import Peaks
 from .recipe import Recipe, recipe_of
 
 DIRECTIONS = ('forwards', 'to the left', 'backwards', 'to the right')
@@ -39,6 +40,8 @@ class DatasetSummary:
     """(f, r) of these to the limits."""
     hic15: np.ndarray = field(default_factory=lambda: np.zeros(0))
     """(f,) s g^2.5, of the head."""
+    peaks: Peaks = field(default_factory=Peaks)
+    """Of the recipe's first IMU; empty without one."""
 
     @property
     def hits(self) -> np.ndarray:
@@ -87,11 +90,16 @@ def summarize(folder: Path) -> DatasetSummary:
     labels = lerobot.read_labels(folder)
     onsets, impacts, rests, impact_times = (
         labels[key] / recipe.rate for key in ('onset', 'impact', 'rest', 'impact_frames'))
+    peaks = Peaks()
+    if recipe.imus:
+        samples = lerobot.read_forces(folder, recipe, recipe.imus[0]['name'])
+        peaks = Peaks.of(recipe.imus[0], samples, impacts,
+                         1 / (recipe.rate * recipe.samples_per_frame))
     return DatasetSummary(
         recipe, [bone.name for bone in recipe.dolls[0].bones], onsets, impacts, rests,
         labels['direction_deg'], impact_times, labels['impact_speeds'], manifest.failures,
         lerobot.read_regions(folder), labels['region_peak_forces_N'], labels['region_ratios'],
-        labels['hic15'])
+        labels['hic15'], peaks)
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

@@ -1,12 +1,15 @@
 """Describe a data set: a page and pictures, compared with published figures of real falls."""
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
 
-from ..people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS, Known, bones_of
+from ..people.real_falls import SHARE_TOLERANCE
 from . import pictures
+from .comparison import comparisons, spread
 from .dataset_summary import DIRECTIONS, DatasetSummary, summarize
+from .peaks import EARLY, Peaks
 from .simulate import generate
 
 PAGE = 'README.md'
@@ -23,7 +26,11 @@ def main(arguments: list[str]) -> int:
     drawn = pictures.draw_all(summary, falls, options.folder)
     page = options.folder / PAGE
     page.write_text(page_text(summary, drawn), encoding='utf-8')
+    print('\n'.join(summary_lines(summary)))
     print(f'{page} and {len(drawn)} pictures')
+    for each in comparisons(summary):
+        if each.outside:
+            print(f'warning: {each.warning}', file=sys.stderr)
     return 0
 
 
@@ -34,6 +41,13 @@ def parser() -> argparse.ArgumentParser:
         f'falls; writes falls/{PAGE} and pictures')
     parser.add_argument('folder', type=Path, help='a data set of the format lerobot')
     return parser
+
+
+def summary_lines(summary: DatasetSummary) -> list[str]:
+    """Directions of the falls, and the peaks of the first IMU with their widths."""
+    shares = ', '.join(f'{name} {share:.0%}' for name, share in
+                       zip(DIRECTIONS, summary.share_towards(), strict=True))
+    return [f'directions: {shares}', *(['peaks ' + text for text in _peaks(summary.peaks)])]
 
 
 def page_text(summary: DatasetSummary, drawn: list[str]) -> str:
@@ -51,7 +65,12 @@ def page_text(summary: DatasetSummary, drawn: list[str]) -> str:
         'A fall hits the ground when a bone other than the feet touches it. Directions are those '
         'of the centre of mass from the start to that instant, relative to the heading at the '
         'start; their shares are of the falls that hit.', '',
-        '## Compared with real falls', '', *_comparison(summary), '',
+        '## Compared with real falls', '',
+        '| | simulated | real falls | | source |', '| --- | --- | --- | --- | --- |',
+        *(each.row for each in comparisons(summary)), '',
+        'Outside: the mean is more than a standard deviation of the real falls away from theirs, a '
+        f'share differs by more than {SHARE_TOLERANCE:.0%}, or a median is outside the range.', '',
+        *(f'Peaks {text}.\n' for text in _peaks(summary.peaks)),
         'The descent lasts from the onset to the impact of the pelvis. Speeds are vertical, of the '
         "bone's centre of mass in the last frame before its first contact; of two hands, the one "
         'that touches first counts.', '', '## Bones that hit', '',
@@ -64,28 +83,20 @@ def page_text(summary: DatasetSummary, drawn: list[str]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _comparison(summary: DatasetSummary) -> list[str]:
-    """Rows of the table of simulated and real falls; none for body parts that the doll lacks."""
-    def row(what: str, part: str, own: np.ndarray, known: Known) -> list[str]:
-        names = [summary.bones[index] for index in bones_of(part, summary.bones)]
-        return [f'| {what} ({", ".join(names)}) | {_spread(own)} | {known.mean:.2f} ± '
-                f'{known.deviation:.2f} | {known.source} |'] if names else []
-
-    rows = ['| | simulated | real falls | source |', '| --- | --- | --- | --- |',
-            *row('descent, s', 'pelvis', summary.descents, DESCENT)]
-    for part, known in IMPACT_SPEEDS.items():
-        rows += row(f'impact speed of the {part}, m/s', part, summary.speeds_of(part), known)
-    for part, (share, source) in SHARE_THAT_HITS.items():
-        if bones_of(part, summary.bones):
-            rows.append(f'| {part} hits in | {summary.share_that_hits(part):.0%} | {share:.0%} | '
-                        f'{source} |')
-    return rows
+def _peaks(peaks: Peaks) -> list[str]:
+    """Heights and widths of a sensor's peaks, in a line; none without a sensor."""
+    if not np.isfinite(peaks.largest).any():
+        return []
+    low, middle, high = np.nanpercentile(peaks.largest, [5, 50, 95])
+    return [f'at {peaks.sensor}: {middle:.1f} g in the median (5 % below {low:.1f}, 5 % above '
+            f'{high:.1f}), {1000 * np.nanmedian(peaks.widths):.0f} ms wide at half their height; '
+            f'{peaks.share_early:.0%} of the falls pass {EARLY:g} g before the impact']
 
 
 def _bones(summary: DatasetSummary) -> list[str]:
     known = np.isfinite(summary.impact_speeds)
     return [f'| {name} | {known[:, bone].mean():.0%} | '
-            f'{_spread(summary.impact_speeds[known[:, bone], bone])} |'
+            f'{spread(summary.impact_speeds[known[:, bone], bone])} |'
             for bone, name in enumerate(summary.bones)
             if name not in summary.recipe.data['feet']]
 
@@ -94,22 +105,12 @@ def _impacts(summary: DatasetSummary) -> list[str]:
     """How hard regions of the body are hit; nothing where the bones have none."""
     if not summary.regions:
         return []
-    rows = [f'| {name} | {np.isfinite(ratios).mean():.0%} | {_spread(_known(forces), 0)} | '
-            f'{_spread(_known(ratios), 1)} |' for name, forces, ratios in zip(
+    rows = [f'| {name} | {np.isfinite(ratios).mean():.0%} | {spread(forces, 0)} | '
+            f'{spread(ratios, 1)} |' for name, forces, ratios in zip(
                 summary.regions, summary.peak_forces.T, summary.ratios.T, strict=True)]
     return ['## Impacts', '', '| region | falls in which it hits | peak force, N | ratio to its '
             'limit |', '| --- | --- | --- | --- |', *rows, '',
-            f'HIC15 of the head: {_spread(_known(summary.hic15), 0)}.', '',
+            f'HIC15 of the head: {spread(summary.hic15, 0)}.', '',
             'Of each fall the impact that is nearest to the limit. Forces are those of a stated '
             'contact law, limits those of pain from contact with robots (ISO/TS 15066): see '
             'docs/falls.md of ragdoll_ros.', '']
-
-
-def _known(values: np.ndarray) -> np.ndarray:
-    return values[np.isfinite(values)]
-
-
-def _spread(values: np.ndarray, digits: int = 2) -> str:
-    if not len(values):
-        return 'none'
-    return f'{values.mean():.{digits}f} ± {values.std():.{digits}f}'

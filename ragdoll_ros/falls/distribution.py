@@ -10,6 +10,10 @@ import numpy as np
 
 from ..model import errors
 
+MEAN_SHIFT = 0.25
+"""Standard deviations by which the bounds of a normal distribution may shift its mean without a
+warning. That of `normal: [0, s], within: [0, 360]`, half of a direction, is shifted by 0.8."""
+
 KINDS = ('uniform', 'normal', 'choice')
 
 
@@ -55,6 +59,34 @@ def support(value: object) -> tuple[float, float]:
     if 'choice' in value:
         return min(value['choice']), max(value['choice'])
     return tuple(value['uniform'] if 'uniform' in value else value['within'])
+
+
+def mean(normal: dict) -> float:
+    """Mean of a truncated normal distribution (Johnson, Kotz, Balakrishnan, Continuous Univariate
+    Distributions 1, 1994, equation 13.134).
+    """
+    centre, deviation = normal['normal']
+    curve = NormalDist(centre, deviation)
+    (low, high) = normal['within']
+    share = curve.cdf(high) - curve.cdf(low)
+    return centre + deviation ** 2 * (curve.pdf(low) - curve.pdf(high)) / share
+
+
+def shifted_means(data: object, path: str = '') -> Iterator[str]:
+    """Warnings of truncated normal distributions whose mean is not that of their `normal`: another
+    by more than MEAN_SHIFT standard deviations.
+    """
+    if isinstance(data, dict) and 'normal' in data:
+        centre, deviation = data['normal']
+        if abs(mean(data) - centre) > MEAN_SHIFT * deviation:
+            yield (f'{path}: the mean is {mean(data):.3g}, not {centre:g}: '
+                   f'within {data["within"]} cuts it off')
+    elif isinstance(data, dict):
+        for key, part in data.items():
+            yield from shifted_means(part, f'{path}.{key}' if path else str(key))
+    elif isinstance(data, list):
+        for index, part in enumerate(data):
+            yield from shifted_means(part, f'{path}[{index}]')
 
 
 def choices(value: object) -> list:

@@ -53,6 +53,8 @@ class Fall:
     """128-bit key of the random generator (Philox) of the sensor noise."""
     worst_impacts: WorstImpacts = field(default_factory=lambda: WorstImpacts({}))
     """Of each region of the body, by the limits of load_limits()."""
+    feet: tuple[str, ...] = ()
+    """Bones that may touch the ground before the impact."""
 
     @property
     def masses(self) -> np.ndarray:
@@ -64,12 +66,16 @@ class Fall:
         """Direction of the centre of mass from the start to first contact, degrees in [-180, 180).
 
         Relative to the doll's heading at the start: 0 forwards, 90 to its left; NaN if the fall
-        has no impact.
+        has no impact. Of a doll that moves horizontally at the start, that of the centre of mass
+        relative to the middle of the feet: who walks goes forwards, wherever the fall goes.
         """
         if self.phases.impact is None:
             return math.nan
         ends = self.states[[0, self.phases.impact], :, :2]
         x, y = np.diff(np.einsum('tnk,n->tk', ends, self.masses), axis=0)[0]
+        if self.feet and any(self.scene.dolls[0].velocity[:2]):
+            feet = ends[1, [self.scene.bone_index(name) for name in self.feet]].mean(axis=0)
+            x, y = self.masses @ ends[1] / self.masses.sum() - feet
         faced = rotation.rotate(self.scene.dolls[0].orientation, (1.0, 0.0, 0.0))
         turned = math.degrees(math.atan2(y, x) - math.atan2(faced[1], faced[0]))
         return (turned + 180) % 360 - 180

@@ -20,6 +20,12 @@ FILE = 'manifest.jsonl'
 PART = '.part'
 """Suffix of a file that is being written."""
 
+ABSENT = 'nothing'
+"""Value of a key that is not there."""
+
+MOST_LISTED, LONGEST = 20, 80
+"""Differences of two recipes in an error, and characters of a value."""
+
 ShardMaker = Callable[[DatasetJob, Iterable[int]], Iterator[Shard]]
 """Makes shards by their numbers and yields them in any order."""
 
@@ -46,9 +52,10 @@ class Manifest:
         """
         header, entries, end = _read(folder / FILE)
         wanted = _header(job)
-        for key, value in wanted.items():
-            if key != 'count' and header.get(key) != value:
-                raise Unreadable(key, header.get(key), f'{value!r}, as requested now')
+        keys = [key for key in wanted if key not in ('count', 'digest')]
+        if found := list(differences({key: header.get(key) for key in keys},
+                                     {key: wanted[key] for key in keys})):
+            raise Unreadable('', str(folder), f'falls of the same recipe; {_listed(found)}')
         if header['count'] > job.count:
             raise Unreadable('count', job.count, f'{header["count"]} or more, as in the folder')
         os.truncate(folder / FILE, end)
@@ -104,6 +111,33 @@ def write_files(folder: Path, files: dict[str, bytes]) -> dict[str, str]:
             raise
         part.replace(path)
     return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+
+
+def differences(old: object, new: object, path: str = '') -> Iterator[tuple[str, str, str]]:
+    """Where JSON data differ: path, old and new value in JSON; ABSENT where there is none."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in [*old, *(key for key in new if key not in old)]:
+            yield from differences(old.get(key, ABSENT), new.get(key, ABSENT),
+                                   f'{path}.{key}' if path else key)
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (one, other) in enumerate(zip(old, new, strict=True)):
+            yield from differences(one, other, f'{path}[{index}]')
+    elif old != new:
+        yield path, _shown(old), _shown(new)
+
+
+def _shown(value: object) -> str:
+    text = ABSENT if value is ABSENT else json.dumps(value)
+    return text if len(text) <= LONGEST else text[:LONGEST - 3] + '...'
+
+
+def _listed(found: list[tuple[str, str, str]]) -> str:
+    """Differences, a line each."""
+    lines = ['these differ:', *(f'{path}: {old} there, {new} now'
+                                for path, old, new in found[:MOST_LISTED])]
+    if len(found) > MOST_LISTED:
+        lines.append(f'and {len(found) - MOST_LISTED} more')
+    return '\n  '.join(lines)
 
 
 def _line(data: dict) -> str:

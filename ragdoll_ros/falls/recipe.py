@@ -11,16 +11,19 @@ from pathlib import Path
 import numpy as np
 
 from ..files import yaml_text
+from ..files.bodies import body_data
 from ..files.config import RECIPES, find
 from ..files.doll import build_doll, doll_data
 from ..files.schema import is_marked, read_by_name, schema_errors, value_or_raise
 from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
+from ..model.static_body import StaticBody
 from ..people import person, standard
 from ..people.fall_phases import ONSET_SPEED, REST_SPEED
+from .bodies import floor_names, read_bodies
 from .checks import RATE, angle_limits_deg, checked_mount, names_of, value_errors
-from .distribution import draw
+from .distribution import draw, shifted_means
 
 DEFAULTS = {
     'seed': 0, 'feet': [], 'start': {}, 'pushes': [], 'limp': [], 'ground': {}, 'accuracy': 'draft',
@@ -33,8 +36,10 @@ GROUND = {'friction': 0.7, 'restitution': 0.0, 'slope_deg': 0.0, 'downhill_deg':
 RECORD = {'rate': RATE, 'what': ['poses', 'velocities', 'angles', 'touching'], 'imus': []}
 PHASES = {'onset_speed': ONSET_SPEED, 'rest_speed': REST_SPEED}
 
-DRAWN = ('seed', 'who', 'start', 'pushes', 'limp', 'ground')
-"""Keys that determine the draws: recipes that agree in these have the same falls."""
+DRAWN = ('seed', 'who', 'start', 'pushes', 'limp', 'ground', 'grabs')
+"""Keys that determine the draws: recipes that agree in these draw the same values."""
+
+GRAB = {'at': 0.0, 'duration': 0.1}
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,13 @@ class Recipe:
     name: str
     data: dict
     dolls: tuple[Ragdoll, ...]
+    bodies: tuple[StaticBody, ...] = ()
+    """Bodies beside the doll, their x axis along its heading."""
+
+    @property
+    def floor(self) -> list[str]:
+        """Names of the bodies that count as ground."""
+        return self.data.get('floor', [])
 
     @property
     def frames(self) -> int:
@@ -76,6 +88,13 @@ class Recipe:
         """
         return self.data['record']['imus']
 
+    @property
+    def warnings(self) -> list[str]:
+        """What its author may not have meant."""
+        return list(shifted_means({key: self.data[key] for key in DRAWN
+                                   if key in self.data and key != 'seed'
+                                   and not (key == 'who' and 'dolls' in self.data[key])}))
+
     @cached_property
     def digest(self) -> str:
         """SHA-256 of the recipe's data, in hexadecimal digits."""
@@ -84,7 +103,7 @@ class Recipe:
     @cached_property
     def philox_key(self) -> int:
         """Key of the random generator, 128 bits: a hash of the DRAWN keys."""
-        return int(_digest({key: self.data[key] for key in DRAWN})[:32], 16)
+        return int(_digest({key: self.data[key] for key in DRAWN if key in self.data})[:32], 16)
 
     def doll(self, who: dict | int) -> Ragdoll:
         """The doll that falls; ``who`` is as returned by draw()."""
@@ -94,9 +113,9 @@ class Recipe:
                       passive=who.get('passive', False))
 
     def draw(self, number: int) -> dict:
-        """Draw the values of fall ``number``: the recipe's ``start``, ``pushes``, ``limp`` and
-        ``ground`` with a value in the place of each distribution, and ``who`` falls: the index of
-        a doll, or a person's sex, height m and bmi kg/m^2.
+        """Draw the values of fall ``number``: the recipe's ``start``, ``pushes``, ``limp``,
+        ``grabs`` and ``ground`` with a value in the place of each distribution, and ``who`` falls:
+        the index of a doll, or a person's sex, height m and bmi kg/m^2.
 
         The generator is Philox (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, 2011);
         its counter begins at the fall's number times 2^192, so falls are drawn independently.
@@ -104,8 +123,8 @@ class Recipe:
         errors.check_range('fall', number, 0, 2 ** 63)
         philox = np.random.Philox(key=self.philox_key, counter=[0, 0, 0, number])
         generator = np.random.Generator(philox)
-        values = draw({key: self.data[key] for key in ('start', 'pushes', 'limp', 'ground')},
-                      generator)
+        values = draw({key: self.data[key] for key in DRAWN
+                       if key in self.data and key not in ('seed', 'who')}, generator)
         groups = self.data['who'].get('people') or self.dolls
         chosen = min(int(generator.random() * len(groups)), len(groups) - 1)
         values['who'] = draw(groups[chosen], generator) if 'people' in self.data['who'] else chosen
@@ -124,7 +143,8 @@ def recipe_of(data: dict) -> Recipe:
     """The recipe with this complete ``data``."""
     dolls = [value_or_raise(Path('recipe'), *build_doll(doll))
              for doll in data['who'].get('dolls', ())] or [person(*standard('female'), 'female')]
-    return Recipe(data['name'], data, tuple(dolls))
+    bodies, found = read_bodies(data, Path())
+    return Recipe(data['name'], data, tuple(dolls), value_or_raise(Path('recipe'), bodies, found))
 
 
 def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelError]]:
@@ -133,6 +153,8 @@ def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelErr
     if not is_marked(data, 'recipe'):
         return None, found
     dolls, more = _dolls(data, path)
+    found += more
+    bodies, more = read_bodies(data, path.parent)
     found += more
     found += value_errors(data, dolls, found)
     if found:
@@ -147,8 +169,14 @@ def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelErr
     whole['record']['imus'] = [
         {**mount, **checked_mount(mount)} for mount in whole['record']['imus']]
     whole['start'] = _with_all_angles(whole['start'], dolls[0])
+    # Keys without a default, so that recipes without them have the falls that they had.
+    if 'grabs' in data:
+        whole['grabs'] = [{**GRAB, **grab} for grab in data['grabs']]
+    if 'bodies' in data:
+        whole['bodies'] = [body_data(body) for body in bodies]
+        whole['floor'] = floor_names(bodies, data.get('floor', []))
     name = whole.setdefault('name', path.stem)
-    return Recipe(name, whole, tuple(dolls)), []
+    return Recipe(name, whole, tuple(dolls), bodies), []
 
 
 def _digest(data: object) -> str:

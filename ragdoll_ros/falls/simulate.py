@@ -1,6 +1,7 @@
 """Simulate a fall from its start and record its frames."""
 import functools
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -44,14 +45,14 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
             failure = str(error)
         simulation.samples_per_tick = recipe.samples_per_frame
         simulation.record_impacts(limits)
-        guard, limp = Guard(simulation), list(start.limp)
+        guard, events = Guard(simulation), _events(simulation, start)
         while frames.valid < recipe.frames and not failure:
             frames.add(simulation)
             if simulation.asleep and simulation.time > start.last_event:
                 frames.hold()
             elif frames.valid < recipe.frames:
-                while limp and limp[0].at <= simulation.time:
-                    simulation.go_limp(limp.pop(0).angles)
+                while events and events[0][0] <= simulation.time:
+                    events.pop(0)[1]()
                 bad = guard.advance()
                 failure = bad.reason if bad else ''
                 if not bad and simulation.impacts:
@@ -64,7 +65,17 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
-                recipe.philox_key, impacts)
+                recipe.philox_key, impacts, tuple(recipe.data['feet']))
+
+
+def _events(simulation: Simulation, start: Start) -> list[tuple[int, Callable[[], None]]]:
+    """Times, ns, and what happens then, in order of time."""
+    events = [(limp.at, partial(simulation.go_limp, limp.angles)) for limp in start.limp]
+    for index, grab in enumerate(start.grabs):
+        hand = f'hand {index}'
+        events += [(grab.at, partial(simulation.grab, hand, grab.bone)),
+                   (grab.until, partial(simulation.let_go, hand))]
+    return sorted(events, key=lambda event: event[0])
 
 
 class _Recorder:
@@ -79,12 +90,14 @@ class _Recorder:
         self.states, self.touching = np.full((count, n, 13), np.nan), np.zeros((count, n), bool)
         self.angles, self.rates = np.full((2, count, k), np.nan)
         self.valid = 0
+        bodies = start.scene.bodies
+        self._furniture = [k for k, body in enumerate(bodies) if body.name not in recipe.floor]
 
     def add(self, simulation: Simulation) -> None:
         """Record the current state as the next frame."""
         at = self.valid
         self.states[at] = simulation.state.rows
-        self.touching[at] = simulation.bones_on_ground
+        self.touching[at] = self._bones_on_ground(simulation)
         self.angles[at], self.rates[at] = simulation.joint_angles, simulation.joint_rates
         if self._imu_bones:
             last = at * self._per_frame
@@ -92,6 +105,14 @@ class _Recorder:
             for back, state in enumerate(substates[:0:-1] if at else substates):
                 self.imu_states[last - back] = state.rows[self._imu_bones]
         self.valid += 1
+
+    def _bones_on_ground(self, simulation: Simulation) -> np.ndarray:
+        """Which bones (n,) touch the ground or a body that counts as ground."""
+        if not self._furniture:
+            return simulation.bones_on_ground  # ground or any static body
+        contacts, found = simulation.contacts, np.zeros(self.touching.shape[1], bool)
+        found[contacts.a[(contacts.b < 0) & ~np.isin(contacts.bodies, self._furniture)]] = True
+        return found
 
     def hold(self) -> None:
         """Repeat the last frame up to the end: the doll sleeps."""
@@ -104,7 +125,10 @@ class _Recorder:
 
 
 def begin(simulation: Simulation, start: Start) -> None:
-    """Place the doll with its lowest point at the clearance, queue pushes, hold joints."""
+    """Place the doll with its lowest point at the clearance, queue pushes, hold joints.
+
+    Bodies count: the doll is moved up along the ground's normal until it is in none.
+    """
     scene = start.scene
     normal = np.array(scene.ground.normal)
     bound = simulation.coordinates
@@ -117,8 +141,34 @@ def begin(simulation: Simulation, start: Start) -> None:
     lift = np.zeros_like(high.q)
     lift[:3] = normal * (start.clearance - lowest)
     simulation.place(GeneralizedState(high.q + lift, high.v))
+    if scene.bodies:
+        _lift_out_of_bodies(simulation, normal)
     for push in start.pushes:
         simulation.push(push)
     if start.limp:
         for angle, spring in standing(scene.dolls[0].doll).items():
             simulation.hold(angle, *spring)
+
+
+HIGHEST, PRECISION = 4.0, 1e-3
+"""m: how far a doll is lifted at most to be out of the bodies, and how exactly."""
+
+
+def _lift_out_of_bodies(simulation: Simulation, normal: np.ndarray) -> None:
+    """Move the doll along ``normal`` (3,) until no body overlaps with it, by bisection."""
+    names = {body.name for body in simulation.scene.bodies}
+    start = simulation.coordinates
+
+    def is_free(height: float) -> bool:
+        q = start.q.copy()
+        q[:3] += height * normal
+        simulation.place(GeneralizedState(q, start.v))
+        return not any(overlap.other in names for overlap in simulation.initial_overlaps)
+
+    low, high = 0.0, HIGHEST
+    if is_free(low):
+        return
+    while high - low > PRECISION:
+        middle = (low + high) / 2
+        low, high = (low, middle) if is_free(middle) else (middle, high)
+    is_free(high)

@@ -1,6 +1,6 @@
 """Initial conditions of a fall from its drawn values: scene, coordinates, pushes."""
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from ..model.push import Push
 from ..model.ragdoll import Ragdoll
 from ..model.rotation import sine_and_cosine
 from ..model.scene import SECOND, Ground, Material, Placement, Scene
+from .bodies import turned
 from .recipe import Recipe
+from .walking import gait
 
 GRAVITY = (0.0, 0.0, -9.8)
 
@@ -21,6 +23,15 @@ class JointRelease:
 
     at: int
     angles: list[str] | None
+
+
+@dataclass(frozen=True)
+class BoneHold:
+    """A ``bone`` whose centre of mass a hand holds where it is, from ``at`` to ``until``, ns."""
+
+    at: int
+    until: int
+    bone: str
 
 
 @dataclass(frozen=True)
@@ -37,12 +48,14 @@ class Start:
     pushes: tuple[Push, ...]
     limp: tuple[JointRelease, ...]
     """In order of time; without any, no joint is held."""
+    grabs: tuple[BoneHold, ...] = ()
 
     @property
     def last_event(self) -> int:
-        """Time of the end of the last push or of the last joint release, ns; 0 without any."""
+        """Time, ns, of the last end of a push or grab or joint release; 0 without any."""
         ends = [round((push.start + push.duration) * SECOND) for push in self.pushes]
-        return max([0, *ends, *(limp.at for limp in self.limp)])
+        return max([0, *ends, *(limp.at for limp in self.limp),
+                    *(grab.until for grab in self.grabs)])
 
     def coordinates(self, bound: GeneralizedState) -> GeneralizedState:
         """Coordinates of the start, at the position of ``bound``, the scene's own."""
@@ -56,7 +69,8 @@ class Start:
 def start_of(recipe: Recipe, number: int) -> Start:
     """Initial conditions of fall ``number``; they depend on recipe and number alone."""
     drawn = recipe.draw(number)
-    doll, start = recipe.doll(drawn['who']), drawn['start']
+    start, ground = drawn['start'], drawn['ground']
+    doll = _with_friction(recipe.doll(drawn['who']), ground)
     heading = rotation.from_axis_angle((0, 0, 1), math.radians(start['heading_deg']))
     sine, cosine = sine_and_cosine(math.radians(start['lean_towards_deg']))
     lean = rotation.from_axis_angle((-sine, cosine, 0.0), math.radians(start['lean_deg']))
@@ -66,14 +80,22 @@ def start_of(recipe: Recipe, number: int) -> Start:
     placement = Placement(doll, orientation=tuple(orientation),
                           velocity=tuple(rotation.rotate(faced, start['velocity'])),
                           spin=tuple(rotation.rotate(faced, start['spin'])))
-    ground = drawn['ground']
+    angles = _angles(doll, start)
+    if 'walk' in start:
+        step = gait(doll, angles, **start['walk'])
+        placement = replace(placement, angles=angles, rates=step.rates,
+                            velocity=tuple(rotation.rotate(orientation, step.velocity)),
+                            spin=tuple(rotation.rotate(orientation, step.spin)))
     scene = Scene(recipe.name, (placement,), _ground(ground), gravity=GRAVITY,
                   material=Material(ground['friction'], restitution=ground['restitution']),
-                  step=1 / recipe.rate)
-    return Start(number, drawn, scene, start['clearance'], _angles(doll, start),
+                  step=1 / recipe.rate, bodies=turned(recipe.bodies, heading))
+    return Start(number, drawn, scene, start['clearance'], angles,
                  tuple(_push(push, heading) for push in drawn['pushes']),
                  tuple(sorted((JointRelease(round(each['at'] * SECOND), each.get('angles'))
-                               for each in drawn['limp']), key=lambda limp: limp.at)))
+                               for each in drawn['limp']), key=lambda limp: limp.at)),
+                 tuple(BoneHold(round(grab['at'] * SECOND),
+                                round((grab['at'] + grab['duration']) * SECOND), grab['bone'])
+                       for grab in drawn.get('grabs', ())))
 
 
 def _uniform_orientation(first: float, second: float, third: float) -> np.ndarray:
@@ -83,6 +105,19 @@ def _uniform_orientation(first: float, second: float, third: float) -> np.ndarra
     (s1, c1), (s2, c2) = (sine_and_cosine(2 * math.pi * share) for share in (second, third))
     low, high = math.sqrt(1 - first), math.sqrt(first)
     return np.array([low * s1, low * c1, high * s2, high * c2])
+
+
+def _with_friction(doll: Ragdoll, ground: dict) -> Ragdoll:
+    """The doll with bones that have the friction ``friction_under`` with the ground: a contact has
+    the geometric mean of the bone's and the ground's.
+    """
+    under = ground.get('friction_under', {})
+    if not under:
+        return doll
+    full = ground['friction']
+    return replace(doll, bones=tuple(
+        replace(bone, friction=under[bone.name] ** 2 / full if full else 0.0)
+        if bone.name in under else bone for bone in doll.bones))
 
 
 def _ground(drawn: dict) -> Ground:

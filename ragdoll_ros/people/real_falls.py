@@ -14,6 +14,15 @@ class Known:
     source: str
 
 
+@dataclass(frozen=True)
+class KnownRange:
+    """A published range and its source."""
+
+    low: float
+    high: float
+    source: str
+
+
 IMPACT_SPEEDS = {'pelvis': Known(2.14, 0.63, CHOI), 'head': Known(2.91, 0.86, CHOI),
                  'hand': Known(2.87, 1.60, CHOI)}
 """Vertical speed, m/s, of each body part at its impact on the ground."""
@@ -23,6 +32,15 @@ DESCENT = Known(0.583, 0.255, CHOI)
 
 SHARE_THAT_HITS = {'pelvis': (0.95, KOMISAR), 'head': (0.35, KOMISAR)}
 """Share of falls in which a body part hits the ground, and the source."""
+
+SHARE_TOLERANCE = 0.1
+"""Difference between two shares of falls above which they are told apart: twice the standard
+deviation of a share of 0.35 in a hundred falls."""
+
+WAIST_PEAK = KnownRange(3.0, 8.0, 'falls on mats, a collection that has not been checked against '
+                        'its papers')
+"""g: largest acceleration of a sensor at the waist. The threshold of Bourke et al. 2007 (Gait
+Posture 26:194), 3.52 g at the trunk, is in it."""
 
 BONES = {'pelvis': ('pelvis', 'lower_trunk', 'trunk', 'torso'), 'head': ('head',),
          'hand': ('hand', 'forearm')}

@@ -11,6 +11,7 @@ worst_region, worst_peak_force_N and worst_ratio, hic15, and of each of the regi
 """
 import io
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,6 +76,17 @@ def read_regions(folder: Path) -> list[str]:
     """The r regions of the body in a data set's labels."""
     path = min(folder.glob('meta/episodes/*/*.parquet'))
     return parquet.read_table(path, columns=['regions']).slice(0, 1).to_pylist()[0]['regions']
+
+
+def read_forces(folder: Path, recipe: Recipe, imu: str) -> Iterator[np.ndarray]:
+    """Specific force (s, 3) m/s^2 that a sensor reads in each fall of a data set, in its axes, the
+    first sample at the start.
+    """
+    for path in sorted(folder.glob('data/*/*.parquet')):
+        table = parquet.read_table(path, columns=[f'observation.imu.{imu}'])
+        flat = table.column(0).combine_chunks().flatten().to_numpy(zero_copy_only=False)
+        for fall in flat.reshape(-1, recipe.frames * recipe.samples_per_frame, len(SAMPLE_NAMES)):
+            yield fall[recipe.samples_per_frame - 1:, :3].astype(float)
 
 
 def _frames(recipe: Recipe, fall: Fall) -> pa.Table:

@@ -10,6 +10,7 @@ from ..recipe import Recipe
 FORMATS = {
     'lerobot': 'Parquet in the layout of LeRobot v3',
     'kfall': 'CSV in the layout of KFall, one per fall',
+    'sisfall': 'text in the layout of SisFall, one per fall',
     'mcap': 'ROS 2 messages, one MCAP per fall',
     'amass': 'npz with the keys of AMASS, one per fall',
     'settled': 'states at rest, for controllers that get up, one npz'}

@@ -1,0 +1,48 @@
+"""Static bodies of a recipe, in the frame of the doll's heading at the start."""
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from ..files.bodies import build_bodies
+from ..files.schema import has_error_under, schema_errors
+from ..model import errors, rotation
+from ..model.errors import ModelError
+from ..model.static_body import StaticBody
+
+
+def read_bodies(data: dict, folder: Path) -> tuple[tuple[StaticBody, ...], list[ModelError]]:
+    """The bodies of a recipe's data, and every error of them and of ``floor``.
+
+    Paths are relative to ``folder``.
+    """
+    found = [error for error in schema_errors('scene', {'dolls': [], **_only_bodies(data)})
+             if has_error_under([error], 'bodies')]
+    bodies, loose = build_bodies(data, folder, found)
+    found += [errors.WrongForm('bodies', body.name, 'bodies that never move, without mass and '
+                               'follow') for body in loose]
+    floor = data.get('floor', [])
+    for index, name in enumerate(floor if isinstance(floor, list) else ()):
+        if not found and not floor_names(bodies, [name]):
+            found.append(errors.OutOfRange(f'floor[{index}]', name, errors.one_of(
+                [body.name for body in bodies], str(name)) if bodies else 'a name of the bodies'))
+    return bodies, found
+
+
+def floor_names(bodies: tuple[StaticBody, ...], names: list[str]) -> list[str]:
+    """Names of the bodies that ``names`` means: also the copies of one that is repeated."""
+    return [body.name for body in bodies
+            if any(body.name == name or body.name.startswith(f'{name}_') for name in names)]
+
+
+def turned(bodies: tuple[StaticBody, ...], heading: np.ndarray) -> tuple[StaticBody, ...]:
+    """Bodies rotated by the quaternion ``heading`` about the origin."""
+    return tuple(dataclasses.replace(
+        body, position=tuple(rotation.rotate(heading, body.position)),
+        orientation=tuple(rotation.multiply(heading, body.orientation))) for body in bodies)
+
+
+def _only_bodies(data: dict) -> dict:
+    return {'bodies': data['bodies']} if 'bodies' in data else {}
