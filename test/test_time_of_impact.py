@@ -27,10 +27,10 @@ from ragdoll_ros.physics.kernels.stepping.time_of_impact import (
     update_bracket,
 )
 from ragdoll_ros.physics.kernels.system import JOINT_LIMIT
-from ragdoll_ros.physics.kernels.workspace import BRACKET
+from ragdoll_ros.physics.kernels.workspace import BRACKET, GAP_COUNTS
 
 Scene = collections.namedtuple('Scene', 'pairs joint_limits body_doll dof_body')
-Gaps = collections.namedtuple('Gaps', 'gaps contacts step')
+Gaps = collections.namedtuple('Gaps', 'gaps contacts step gap_counts')
 Contacts = collections.namedtuple('Contacts', 'gaps_end gaps_active')
 Step = collections.namedtuple('Step', 'bracket gaps_low gaps_high')
 
@@ -46,7 +46,8 @@ def gaps(start):
     """What of a workspace gaps are."""
     count = len(start)
     return Gaps(np.array(start), Contacts(np.zeros(count), np.array(start)),
-                Step(np.zeros(1, BRACKET), np.zeros(count), np.zeros(count)))
+                Step(np.zeros(1, BRACKET), np.zeros(count), np.zeros(count)),
+                np.full(1, count, GAP_COUNTS))
 
 
 @kept

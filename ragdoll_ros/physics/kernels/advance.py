@@ -12,7 +12,7 @@ One tick of a cluster, and what its stages read and write:
         find_first_contact       dense_step -> event_time         conservative advancement
         follow_dense_step        dense_step -> q, v               to the event or the time's end
       or
-        begin_contact_step       q, v -> start contacts, sums_before
+        begin_contact_step       q, v -> start contacts, their points, sums_before
         step_to_impact           q, v, gaps -> q, v, gaps         step control, time of impact
           contact_step           -> q_end, v_end                  Moreau's centered scheme
             unconstrained_velocity  middle, loads, springs -> v_free, factor of the mass matrix

@@ -96,12 +96,12 @@ ClusterState = collections.namedtuple(
 velocities of roots along the roots' own axes. ``dense_step`` (1,), with its polynomial
 ``dense_output`` (8, nq + nv) and the state derivatives at its ends, ``end_rates`` (2, nq + nv).
 ``stats`` (1,). ``excluded`` (p,): flags of the pairs within dolls, see system.py. ``contacts``: of
-the last step. ``gaps``: see contact/gaps.py. ``contact_accelerations`` (nv,): by contacts in the
-last step, zero unless all of them persist. Output: ``bone_states`` (n, 13), ``doll_sums`` (d,), and
-``contact_impulses`` (n, 3) N s: of contacts on each bone since the start, world frame;
-``impact_log`` (k,): of the last advance, where k is not 0, and ``impact_count`` (1,), how many
-there were, more than k if there was no room for some.
-Input: ``loads``, ``springs``."""
+the last step. ``gaps``: see contact/gaps.py, with room for those of points.
+``contact_accelerations`` (nv,): by contacts in the last step, zero unless all of them persist.
+Output: ``bone_states`` (n, 13), ``doll_sums`` (d,), and ``contact_impulses`` (n, 3) N s: of
+contacts on each bone since the start, world frame; ``impact_log`` (k,): of the last advance, where
+k is not 0, and ``impact_count`` (1,), how many there were, more than k if there was no room for
+some. Input: ``loads``, ``springs``."""
 
 
 def make_cluster_state(system: System, contacts: int = 0) -> ClusterState:
@@ -111,7 +111,7 @@ def make_cluster_state(system: System, contacts: int = 0) -> ClusterState:
         q=np.zeros(nq), v=np.zeros(nv), dense_output=np.zeros((8, nq + nv)),
         end_rates=np.zeros((2, nq + nv)), dense_step=np.zeros(1, DENSE_STEP),
         stats=np.zeros(1, STEP_STATS), excluded=np.zeros(len(system.pairs), np.int64),
-        contacts=np.zeros(contacts, CONTACT), gaps=np.zeros(gap_count(system)),
+        contacts=np.zeros(contacts, CONTACT), gaps=np.zeros(gap_count(system) + contacts),
         contact_accelerations=np.zeros(nv), bone_states=np.zeros((len(system.tree), 13)),
         doll_sums=np.zeros(len(system.doll_masses), DOLL_SUMS),
         contact_impulses=np.zeros((len(system.tree), 3)), impact_count=np.zeros(1, np.int64),

@@ -13,7 +13,7 @@ from .maths.anderson import make_anderson
 from .maths.minimum_degree import make_minimum_degree
 from .maths.sparse_lu import make_sparse_lu
 from .system import (CONTACT_POINT, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System,
-                     blank_system, coordinate_count, tree_depth)
+                     blank_system, coordinate_count, gap_count, tree_depth)
 
 MOTION = np.dtype([('speed', float), ('angular_speed', float), ('correction', float),
                    ('correction_angle', float)], align=True)
@@ -39,13 +39,17 @@ BRACKET = np.dtype([('low', float), ('high', float), ('moved', np.int64), ('halv
 it was last halved, and the chords since."""
 
 STEP_SCALARS = np.dtype([
-    ('start_contact_count', np.int64), ('tried_count', np.int64), ('seeks_impacts', np.int64),
-    ('correction_energy', float), ('start_load_potential', float), ('residual', float),
-    ('solve_error', float)], align=True)
-"""Of a contact step: contacts at its start, and in its last trial if that was as long; whether it
-ends at impacts; potential energy that position correction adds, J; load_potential() at its start,
-J; the largest residual velocity of its large islands, m/s, and the share of the velocities that is
-allowed, see physics/accuracy.py."""
+    ('start_contact_count', np.int64), ('start_point_count', np.int64), ('tried_count', np.int64),
+    ('tracks_points', np.int64), ('seeks_impacts', np.int64), ('correction_energy', float),
+    ('start_load_potential', float), ('residual', float), ('solve_error', float)], align=True)
+"""Of a contact step: contacts at its start, points that have gaps of their own then, and contacts
+in its last trial if that was as long; whether points have gaps now; whether it ends at impacts;
+potential energy that position correction adds, J; load_potential() at its start, J; the largest
+residual velocity of its large islands, m/s, and the share of the velocities that is allowed, see
+physics/accuracy.py."""
+
+GAP_COUNTS = np.dtype([('fixed', np.int64), ('live', np.int64)], align=True)
+"""Gaps of ground points, limits and pairs; these and those of contacts.points."""
 
 OCCURRENCE = np.dtype([('member', np.int64), ('place', np.int64)], align=True)
 """A member of an island that a degree of freedom moves, and its place in the member's support."""
@@ -60,12 +64,15 @@ compliances, as shares of the diagonal of W, of position correction and of impul
 separates as the step begins."""
 
 Contacts = collections.namedtuple(
-    'Contacts', 'found start tried gaps_end gaps_active manifold motion joint_outside angles u v')
+    'Contacts', 'found start tried gaps_end gaps_active points point_pair '
+    'first_point manifold edge_manifold motion joint_outside angles u v')
 """Contacts (c,) that are ``found`` at a pose, those at the ``start`` of the step, and those that
 were ``tried`` in its last trial. Gaps: ``gaps_end`` at the end of a step; ``gaps_active``, by which
-contacts are found in it. ``manifold``: of one pair. ``motion`` (n,); ``joint_outside`` (n,):
-whether the joint of a body is outside its limits. ``angles``, ``u``, ``v`` (c,): the corners of a
-patch in order, see patch.py."""
+contacts are found in it. ``points`` that have gaps of their own, the ``point_pair`` of each, and
+the ``first_point`` (p,) among them of each pair, see point_gaps.py. ``manifold``: of one pair;
+``edge_manifold``: of one at an internal edge. ``motion`` (n,); ``joint_outside`` (n,): whether the
+joint of a body is outside its limits. ``angles``, ``u``, ``v`` (c,): the corners of a patch in
+order, see patch.py."""
 
 Island = collections.namedtuple(
     'Island', 'members label Y YT support place W G blocks rhs impulses free_velocity '
@@ -102,8 +109,10 @@ Flight = collections.namedtuple(
 ``stages`` (16, nq + nv) and a ``derivative`` (nq + nv,); ``contact_gaps``:
 at which gaps count as contacts; ``motion`` (n,)."""
 
-Workspace = collections.namedtuple('Workspace', 'contacts island step flight stats excluded gaps')
-"""Scratch for clusters of one system; ``stats``, ``excluded`` and ``gaps`` are the cluster's."""
+Workspace = collections.namedtuple(
+    'Workspace', 'contacts island step flight stats excluded gaps gap_counts')
+"""Scratch for clusters of one system; ``stats``, ``excluded`` and ``gaps`` are the cluster's.
+``gap_counts`` (1,): how many gaps there are, all others are room for those of points."""
 
 
 def make_workspace(system: System, cluster: ClusterState) -> Workspace:
@@ -112,6 +121,8 @@ def make_workspace(system: System, cluster: ClusterState) -> Workspace:
     dolls, contacts, gaps = len(system.doll_masses), len(cluster.contacts), len(cluster.gaps)
     rolls = max(system.geoms['rolling_friction'].max(initial=0.0),
                 system.pairs['rolling_friction'].max(initial=0.0)) > 0
+
+    counts = np.full(1, gap_count(system), GAP_COUNTS)
 
     def kinematics() -> object:
         return make_kinematics(bodies, nv, len(system.geoms))
@@ -131,13 +142,16 @@ def make_workspace(system: System, cluster: ClusterState) -> Workspace:
     found = Contacts(
         found=np.zeros(contacts, CONTACT), start=np.zeros(contacts, CONTACT),
         tried=np.zeros(contacts, CONTACT), gaps_end=np.zeros(gaps), gaps_active=np.zeros(gaps),
-        manifold=np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT), motion=np.zeros(bodies, MOTION),
+        points=np.zeros(contacts, CONTACT_POINT), point_pair=np.zeros(contacts, np.int64),
+        first_point=np.zeros(len(system.pairs), np.int64),
+        manifold=np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT),
+        edge_manifold=np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT), motion=np.zeros(bodies, MOTION),
         joint_outside=np.zeros(bodies, np.int64), angles=np.zeros(max(contacts, 8)),
         u=np.zeros(max(contacts, 8)), v=np.zeros(max(contacts, 8)))
     return Workspace(
         contacts=found, island=_make_island(system, contacts, contacts * (5 if rolls else 3)),
         step=step, flight=flight, stats=cluster.stats, excluded=cluster.excluded,
-        gaps=cluster.gaps)
+        gaps=cluster.gaps, gap_counts=counts)
 
 
 def _make_island(system: System, contacts: int, rows: int) -> Island:

@@ -9,6 +9,7 @@ from ....model.coordinates import DofLayout
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import DRAFT
+from ...kernels.system import gap_count
 from ...rigid_body import GroundHeights
 from ..protocol import GROUND, Overlap
 from .broad_phase import BroadPhase
@@ -71,7 +72,8 @@ def _overlapping(scene: Scene, clusters: Clusters) -> Iterator[tuple[Pair, float
         yield (bone, GROUND), -float(heights[bone])
     for cluster in clusters.members:
         pairs = cluster.system.pairs
-        gaps = cluster.state.gaps[len(cluster.state.gaps) - len(pairs):]
+        count = gap_count(cluster.system)
+        gaps = cluster.state.gaps[count - len(pairs):count]
         touching = np.flatnonzero(gaps < -TOLERANCE)
         if not len(touching):
             continue

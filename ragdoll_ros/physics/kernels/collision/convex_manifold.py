@@ -13,8 +13,9 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..maths.vectors import Vec3, add, add_scaled, column, dot, neg, put, scale, sub, vec
 from .clipping import MAX_CLIPPED, clip_polygon
-from .features import FEATURE_SINE, MAX_CORNERS, face_cosine, supporting_edge, supporting_face
-from .manifold import CLIP_VERTEX, merge_points, reduce_points
+from .features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, supporting_edge,
+                       supporting_face)
+from .manifold import CLIP_VERTEX, merge_points, reduce_points, sort_points
 from .separating_axis import FACE_BIAS, FACE_BIAS_RATIO, Axis, face_or_edge_axis, refine_axis
 from .shapes import BOX, CYLINDER, Shape, bounding_radius, support_point
 
@@ -27,11 +28,16 @@ MERGE_RATIO = 1e-3
 """Points closer than this part of the smaller bounding radius are merged."""
 
 FACE_TIE = 1e-10
-"""Faces whose cosines differ by less are equal: the reference is a, unless only b is a box."""
+"""Faces whose cosines differ by less are equal: the reference is b, which may be static, so that
+the points on it are corners of a as when a is tilted; it is a if that alone is a box."""
 
 DEPTH_TOLERANCE = 1e-10
 """m: tolerance of the deepest point's gap against the shapes' separation where the axis is no face
 normal; where it is one, the bias of faces."""
+
+CORNER_IDS = 12 * 6 * 2 * MAX_CORNERS * 2 * MAX_CORNERS
+"""First of the feature ids of corners on the reference face, whichever the incident face is: below
+it points are known by both faces and the sides that meet there."""
 
 CLOSEST_POINTS_ID = 2 * MAX_CORNERS * 2 * MAX_CORNERS - 1
 """Feature id of the contact at the closest points, which no two sides of faces have."""
@@ -63,7 +69,7 @@ def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> 
     cosine = max(cosine_a, cosine_b)
     along_face = cosine > 1 - FACE_TIE
     incident, reference, sign = b, a, -1.0
-    if cosine_b > cosine_a + (FACE_TIE if a.kind == BOX else -FACE_TIE):
+    if cosine_b > cosine_a + (FACE_TIE if a.kind == BOX and b.kind != BOX else -FACE_TIE):
         incident, reference, sign = a, b, 1.0
     if cosine >= FACE_COSINE:
         count = _clip_faces(incident, reference, n, sign, scratch)
@@ -86,6 +92,7 @@ def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> 
         count += 1
     distance = MERGE_RATIO * min(bounding_radius(a), bounding_radius(b))
     count = reduce_points(points, merge_points(points, count, margin, distance))
+    sort_points(points, count)
     for i in range(count):
         contact, point = manifold[i], points[i]
         put(contact.point, add(origin, vec(point.point)))
@@ -110,7 +117,7 @@ def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
     offset = sub(incident.position, reference.position)
     for i in range(number):
         put(polygon[i].point, add(vec(polygon[i].point), offset))
-        polygon[i].feature_id = i
+        polygon[i].feature_id = corner_id(incident, incident_face, i)
     number = clip_polygon(corners, count, n, polygon, number, points)
     normal = column(reference.rotation, face // 2 if reference.kind == BOX else 2)
     origin, cosine = vec(corners[0].point), dot(normal, n)
@@ -123,6 +130,8 @@ def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
         points[i].gap = sign * height
         points[i].feature_id = (
             faces * 2 * MAX_CORNERS + side) * 2 * MAX_CORNERS + vertex.feature_id
+        if side < MAX_CORNERS and vertex.feature_id < MAX_CORNERS:
+            points[i].feature_id = CORNER_IDS + faces // 6 * MAX_CORNERS + vertex.feature_id
     return number
 
 

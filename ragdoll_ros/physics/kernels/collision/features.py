@@ -72,6 +72,18 @@ def _box_face(shape: Shape, n: Vec3, corners: np.ndarray) -> int:
 
 
 @compiled
+def corner_id(shape: Shape, face: int, k: int) -> int:
+    """Id, below MAX_CORNERS, of corner k of a face with this id, see supporting_face(): of a box
+    the same on all three faces that share it.
+    """
+    if shape.kind != BOX:
+        return k
+    axis = face // 2
+    return ((1 - face % 2) << axis | (1 if k == 0 or k == 3 else 0) << (axis + 1) % 3
+            | (1 if k < 2 else 0) << (axis + 2) % 3)
+
+
+@compiled
 def face_cosine(shape: Shape, n: Vec3) -> float:
     """Cosine between n (world) and the closest normal of a box's face or a cylinder's cap."""
     x, y, z = to_local(shape.rotation, n)

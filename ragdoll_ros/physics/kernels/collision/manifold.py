@@ -62,6 +62,16 @@ def reduce_points(points: np.ndarray, count: int) -> int:
 
 
 @compiled
+def sort_points(points: np.ndarray, count: int) -> None:
+    """Sort points by their feature ids, in place: those of one patch keep their order."""
+    for i in range(1, count):
+        for k in range(i, 0, -1):
+            if points[k - 1].feature_id <= points[k].feature_id:
+                break
+            _swap(points[k - 1], points[k])
+
+
+@compiled
 def _swap(a: np.record, b: np.record) -> None:
     p, q = vec(a.point), vec(b.point)
     put(a.point, q)

@@ -15,11 +15,12 @@ from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Contacts, Workspace
-from .gaps import MET, TOUCHING, ground_point, plane_of
+from .gaps import FAR, MET, NONE, SLOW, TOUCHING, ground_point, plane_of
 from .patch import contract_friction_points
 from .placed_shape import placed_shape
+from .point_gaps import points_at_start, takes_part
 
-IDS_PER_PAIR = 4096
+IDS_PER_PAIR = 32768
 """Range of ids that the points of one pair have."""
 
 SAME_DIRECTION = 1e-3
@@ -28,10 +29,11 @@ SAME_DIRECTION = 1e-3
 
 @compiled
 def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps: np.ndarray,
-                  margin: float) -> int:
-    """Write to contacts.found the contacts at q whose gap in ``gaps`` is at most TOUCHING; of a
-    pair the points nearer than ``margin`` m, or than the pair has closed since ws.gaps, if that is
-    more. Returns their number. ``kin``: of q, with its geoms.
+                  h: float) -> int:
+    """Write to contacts.found the contacts at q, the middle of a step of h s, whose gap in ``gaps``
+    is at most TOUCHING; h = 0: those at an instant. Of a pair they are the points whose own gap is,
+    or where they have none, those nearer than what closes slowly in h s, or than the pair has
+    closed since ws.gaps, if that is more. Returns their number. ``kin``: of q, with its geoms.
     """
     m, n, contacts = 0, 0, ws.contacts.found
     for k in range(len(s.geoms)):
@@ -58,9 +60,8 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
                 write_ground_contact(s, kin, pair.a, pair.point, normal, offset, pair, contacts[m])
                 m += 1
         elif gaps[n + k] <= TOUCHING:
-            near = max(margin, ws.gaps[n + k] - gaps[n + k])
-            m = add_pair_contacts(s, ws.contacts, kin, k, m, near,
-                                  n + len(s.pairs) + IDS_PER_PAIR * k)
+            near = max(SLOW * h if h > 0 else TOUCHING, ws.gaps[n + k] - gaps[n + k])
+            m = add_pair_contacts(s, ws, kin, q, k, m, near, h)
     set_friction_points(s, ws.contacts, kin, m)
     return m
 
@@ -97,17 +98,25 @@ def write_limit(s: System, q: np.ndarray, k: int, side: int, id_: int, c: np.rec
 
 
 @compiled
-def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m: int,
-                      margin: float, first_id: int) -> int:
-    """Append the points of pair k to m contacts in contacts.found. Returns their number then."""
-    pair = s.pairs[k]
-    a, b = s.geoms[pair.a], s.geoms[pair.b]
-    found = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b), margin,
-                    contacts.manifold)
-    for j in range(found):
+def add_pair_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int, m: int,
+                      margin: float, h: float) -> int:
+    """Append the points of pair k to m contacts in contacts.found, those without gaps of their own
+    if nearer than ``margin`` m: see find_contacts(). Returns their number then.
+    """
+    pair, contacts, manifold, begin = s.pairs[k], ws.contacts, ws.contacts.manifold, 0
+    a, b, first_id = s.geoms[pair.a], s.geoms[pair.b], ws.gap_counts[0].fixed + IDS_PER_PAIR * k
+    tracked = ws.step.scalars[0].tracks_points != 0 and contacts.first_point[k] != NONE
+    if tracked and h == 0.0:
+        manifold, (begin, end) = contacts.points, points_at_start(ws, k)
+    else:
+        end = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b),
+                      FAR if tracked else margin, manifold)
+    for j in range(begin, end):
         if m >= len(contacts.found):
             break
-        c, at = contacts.found[m], contacts.manifold[j]
+        c, at = contacts.found[m], manifold[j]
+        if at.gap > margin if h == 0.0 else tracked and not takes_part(s, ws, kin, q, k, at, h):
+            continue
         c.kind = ROLLING if pair.rolling_friction > 0 else FRICTIONAL
         c.body_a, c.body_b, c.id = a.body, b.body, first_id + at.feature_id
         if b.kind == TRIANGLE and at.feature_id < ON_FACE:

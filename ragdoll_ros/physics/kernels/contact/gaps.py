@@ -2,7 +2,7 @@
 
 In order: heights of each geom's ground points, m; distances of each limited joint from its lower
 and its upper limit, rad; separations of the pairs of geoms, m, where they are far a lower bound,
-and NEAR at internal edges.
+and NEAR at internal edges; in a step, those of the points of pairs that touch (point_gaps.py).
 """
 from __future__ import annotations
 
@@ -50,6 +50,15 @@ LEVEL = 1e-6
 """Sine of the tilt below which the end of a cylinder lies flat: which point of its rim is lowest
 says nothing, and would jump from step to step."""
 
+SLOW = 0.02
+"""m/s, and SLOW_TURN rad/s: contacts that close more slowly begin with the next step, without
+restitution; their time of impact is not sought."""
+
+SLOW_TURN = 0.1
+
+NONE = -1
+"""First point of a pair whose points have no gaps of their own, and index of such a point."""
+
 EXCLUDED = 1e6
 """m: the gap of a pair that does not collide."""
 
@@ -69,6 +78,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
     """Write all gaps at q to ``out`` (k,) and place the geoms in ``kin``, which is that of q and of
     the current velocities. ``before``: the gaps h s earlier, from which pairs are known to be far
     still (h infinite: unknown); may be ``out``. Reads ws.excluded and contacts.motion[].correction.
+    In a step the gaps of pairs whose points have their own are left to update_point_gaps().
     """
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     n, narrow_phases = 0, 0
@@ -81,7 +91,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
         limit = s.joint_limits[k]
         out[n], out[n + 1] = q[limit.q] - limit.lower, limit.upper - q[limit.q]
         n += 2
-    motion = ws.contacts.motion
+    motion, tracks = ws.contacts.motion, ws.step.scalars[0].tracks_points != 0
     if len(s.pairs):
         for i in range(len(s.tree)):
             velocity, motion[i].angular_speed = body_velocity(kin, i)
@@ -91,6 +101,8 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
             out[n + k] = EXCLUDED
             continue
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
+        if tracks and ws.contacts.first_point[k] != NONE:
+            continue
         if b.kind == PLANE:
             if s.pairs[k].point == 0:
                 normal, offset = plane_of(kin, s.pairs[k].b)
@@ -103,10 +115,8 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
         if least > NEAR:
             out[n + k] = least
         else:
-            out[n + k] = pair_gap(s, k, kin)
+            out[n + k] = past_internal_edges(s, ws, kin, k, pair_gap(s, k, kin))
             narrow_phases += 1
-            if out[n + k] < FLUSH and is_at_internal_edge(s, kin, k, ws.contacts.manifold):
-                out[n + k] = NEAR
     ws.stats[0].ledger.gap_updates += 1
     ws.stats[0].ledger.narrow_phases += narrow_phases
 
@@ -124,7 +134,7 @@ def label_reachable(s: System, ws: Workspace, kin: Kinematics, gaps: np.ndarray,
         motion[i].correction = motion[i].correction_angle = 0.0
     for d in range(len(label)):
         label[d] = d
-    first = len(gaps) - len(s.pairs)
+    first = ws.gap_counts[0].fixed - len(s.pairs)
     for k in range(len(s.pairs)):
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
         if b.body == WORLD:
@@ -299,13 +309,21 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
 
 
 @compiled
-def first_joint_limit_gap(s: System, gaps: np.ndarray) -> int:
-    """Index of the first gap that is the distance of a joint from a limit."""
-    return len(gaps) - len(s.pairs) - 2 * len(s.joint_limits)
+def past_internal_edges(s: System, ws: Workspace, kin: Kinematics, k: int, gap: float) -> float:
+    """The ``gap``, m, of pair k, but NEAR where it is at an internal edge alone."""
+    if gap < FLUSH and is_at_internal_edge(s, kin, k, ws.contacts.edge_manifold):
+        return NEAR
+    return gap
 
 
 @compiled
-def is_joint_limit_gap(s: System, gaps: np.ndarray, j: int) -> bool:
+def first_joint_limit_gap(s: System, ws: Workspace) -> int:
+    """Index of the first gap that is the distance of a joint from a limit."""
+    return ws.gap_counts[0].fixed - len(s.pairs) - 2 * len(s.joint_limits)
+
+
+@compiled
+def is_joint_limit_gap(s: System, ws: Workspace, j: int) -> bool:
     """Whether gap j is the distance of a joint from a limit, rad (else m)."""
-    first = first_joint_limit_gap(s, gaps)
+    first = first_joint_limit_gap(s, ws)
     return first <= j < first + 2 * len(s.joint_limits)

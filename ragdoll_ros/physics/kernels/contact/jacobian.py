@@ -5,6 +5,7 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact_kind import LIMIT, ROLLING
+from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics, linear, root_position, velocity_at
 from ..maths.vectors import Vec3, add, cross, dot, sub, vec
 from ..system import System
@@ -117,3 +118,12 @@ def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
         start[3] += sign * dot(t, turn)
         start[4] += sign * dot(w, turn)
         c.spin += sign * dot(n, turn)
+
+
+@compiled
+def normal_velocity(s: System, kin: Kinematics, q: np.ndarray, body: int, point: Vec3,
+                    normal: Vec3) -> float:
+    """Velocity, m/s, along ``normal`` of a body's point that is at ``point``, m, world."""
+    if body == WORLD:
+        return 0.0
+    return dot(normal, velocity_at(kin, body, sub(point, root_of(s, q, body))))

@@ -11,11 +11,11 @@ from ..collision.shapes import PLANE
 from ..compiling.decorators import compiled
 from ..contact.gaps import (FAR, NEAR, TOUCHING, ground_point, plane_of,
                             update_kinematics_and_gaps)
-from ..contact.jacobian import root_of
+from ..contact.jacobian import normal_velocity
 from ..contact.placed_shape import placed_shape
 from ..dynamics.body import WORLD
-from ..dynamics.kinematics import Kinematics, body_velocity, velocity_at
-from ..maths.vectors import Vec3, dot, norm, sub, vec
+from ..dynamics.kinematics import Kinematics, body_velocity
+from ..maths.vectors import dot, norm, sub, vec
 from ..system import System
 from ..workspace import Workspace
 from .dense_step import ACCELERATION_FACTOR, acceleration_bounds, evaluate_dense_step
@@ -87,15 +87,6 @@ def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarra
 
 
 @compiled
-def normal_velocity(s: System, kin: Kinematics, q: np.ndarray, body: int, point: Vec3,
-                    normal: Vec3) -> float:
-    """Velocity, m/s, along ``normal`` of a body's point that is at ``point``, m, world."""
-    if body == WORLD:
-        return 0.0
-    return dot(normal, velocity_at(kin, body, sub(point, root_of(s, q, body))))
-
-
-@compiled
 def pair_time_to_close(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int, gap: float,
                        contact: float, acceleration: float) -> float:
     """Least time, s, for the ``gap`` of pair k, m, to fall to ``contact``, of all points of its
@@ -145,14 +136,14 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
     for _ in range(MAX_SAMPLES):
         evaluate_dense_step(s.tree, cluster, time, q, v)
         update_kinematics_and_gaps(s, ws, kin, q, v, gaps, math.inf, gaps)
-        least = least_gap(gaps, flight.contact_gaps)
+        least = least_gap(ws, gaps)
         if least < -CLOSED:
             step.event_time = regula_falsi(s, ws, cluster, before, time)
             return
         if least <= CLOSED:
             step.event_time = time
             return
-        reset_separated(gaps, flight.contact_gaps)
+        reset_separated(ws, gaps)
         safe = time_without_contact(s, ws, kin, q, v, gaps, acceleration, relative,
                                     cluster.end_rates)
         before = time
@@ -172,28 +163,28 @@ def set_contact_gaps(ws: Workspace) -> None:
     would be a contact at once, and again after each impact. Never below DEEPEST_START: what
     penetrates farther does not fly.
     """
-    for j in range(len(ws.gaps)):
+    for j in range(ws.gap_counts[0].fixed):
         ws.flight.contact_gaps[j] = 0.0 if ws.gaps[j] > TOUCHING else max(
             min(ws.gaps[j] + TOUCHING, 0.0) - 2 * TOUCHING, DEEPEST_START)
 
 
 @compiled
-def least_gap(gaps: np.ndarray, contact_gaps: np.ndarray) -> float:
+def least_gap(ws: Workspace, gaps: np.ndarray) -> float:
     """What is left, m or rad, until the first of the gaps is a contact."""
     least = math.inf
-    for j in range(len(gaps)):
-        least = min(least, gaps[j] - contact_gaps[j])
+    for j in range(ws.gap_counts[0].fixed):
+        least = min(least, gaps[j] - ws.flight.contact_gaps[j])
     return least
 
 
 @compiled
-def reset_separated(gaps: np.ndarray, contact_gaps: np.ndarray) -> None:
+def reset_separated(ws: Workspace, gaps: np.ndarray) -> None:
     """Let gaps that have separated count as contacts when they close, at an instant before which
     regula_falsi() will not look.
     """
-    for j in range(len(gaps)):
+    for j in range(ws.gap_counts[0].fixed):
         if gaps[j] > TOUCHING:
-            contact_gaps[j] = 0.0
+            ws.flight.contact_gaps[j] = 0.0
 
 
 @compiled
@@ -207,7 +198,7 @@ def regula_falsi(s: System, ws: Workspace, cluster: ClusterState, early: float,
         evaluate_dense_step(s.tree, cluster, time, flight.q, flight.v)
         update_kinematics_and_gaps(s, ws, flight.kinematics, flight.q, flight.v, gaps, math.inf,
                                    gaps)
-        gap = least_gap(gaps, flight.contact_gaps)
+        gap = least_gap(ws, gaps)
         if turn == 0:
             if gap <= 0:
                 break

@@ -6,7 +6,8 @@ import math
 from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts
-from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
+from ..contact.gaps import update_kinematics_and_gaps
+from ..contact.jacobian import normal_velocity
 from ..contact_kind import LIMIT
 from ..dynamics.body import WORLD
 from ..dynamics.forward_dynamics import state_derivative
@@ -17,7 +18,7 @@ from ..stepping.work import load_power
 from ..system import System
 from ..workspace import Workspace
 from .dense_step import evaluate_dense_step
-from .first_contact import normal_velocity, set_contact_gaps, time_without_contact
+from .first_contact import set_contact_gaps, time_without_contact
 
 SEPARATION_SPEED = 5e-3
 """m/s or rad/s at which contacts separate for a flight: to 1.3 um under gravity, which is what
@@ -53,7 +54,7 @@ def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> 
             return False
     forward_kinematics(s.tree, q, v, kin)
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
-    m = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
+    m = find_contacts(s, ws, kin, q, ws.gaps, 0.0)
     if not contacts_separate(s, ws, cluster, m):
         return False
     if m == 0 or len(s.tree) == len(ws.step.external):

@@ -13,10 +13,11 @@ import numpy as np
 from ..cluster_state import ClusterState
 from ..compiling.cycles import cycles
 from ..compiling.decorators import compiled
-from ..contact.find_contacts import find_contacts, had_met, is_on_plane
-from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
+from ..contact.find_contacts import find_contacts, had_met
+from ..contact.gaps import update_kinematics_and_gaps
 from ..contact.jacobian import contact_velocities
 from ..contact.patch_friction import set_slip_friction
+from ..contact.point_gaps import track_points, update_point_gaps
 from ..contact_kind import LIMIT
 from ..dynamics.bias_forces import bias_forces
 from ..dynamics.kinematics import (forward_kinematics, integrate_positions, place_geoms,
@@ -28,7 +29,7 @@ from ..impulses.solver import UNSOLVED
 from ..system import NO_SLIP, System
 from ..workspace import Workspace
 from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
-from .impact import SLOW, is_approaching
+from .impact import is_approaching
 from .position_correction import (clip_to_joint_limits, correction_energy, write_correction_bounds,
                                   limit_correction_energy)
 from .springs import add_implicit_stiffness, add_spring_force, saturate_springs, theta_weight
@@ -48,14 +49,16 @@ STEADY = 1.0
 @compiled
 def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
     """Write the contacts that touch by ws.gaps, with their velocities, to contacts.start, their
-    number and the load potential to step.scalars, and step.sums_before. Overwrites step.start.
+    number and the load potential to step.scalars, and step.sums_before; give points of pairs that
+    touch their gaps. Overwrites step.start.
     """
     q, v, kin, scalars = cluster.q, cluster.v, ws.step.start, ws.step.scalars[0]
     forward_kinematics(s.tree, q, v, kin)
     sum_dolls(s, ws, kin, q, ws.step.sums_before)
     scalars.start_load_potential = load_potential(s, kin, q, cluster.loads)
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
-    m = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
+    track_points(s, ws, kin)
+    m = find_contacts(s, ws, kin, q, ws.gaps, 0.0)
     for i in range(m):
         contact_velocities(s, kin, q, v, ws.contacts.found[i])
         ws.contacts.start[i] = ws.contacts.found[i]
@@ -65,14 +68,12 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 @compiled
 def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
     """Whether a contact at the start of a step that was open in the last one closes so fast that it
-    is an impact: after an impact what had no part in it; after a step points of bodies that it
-    made penetrate, whose gap was that of their nearest points. Others closed too slowly in it.
+    is an impact: after an impact what had no part in it. After a step all closed too slowly in it.
     """
-    after_step = ws.stats[0].ended_without_impact != 0
+    if ws.stats[0].ended_without_impact:
+        return False
     for i in range(ws.step.scalars[0].start_contact_count):
         c = ws.contacts.start[i]
-        if after_step and is_on_plane(s, c.patch):
-            continue
         if is_approaching(c) and not (
                 had_met(s, cluster.contacts, ws.stats[0].contact_count, c.id)):
             return True
@@ -96,7 +97,7 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
     moved = cycles()
     ledger.dynamics_cycles += moved - start_cycles
     place_geoms(s.tree, s.body_root, s.geoms, step.q_middle, kin)
-    m = find_contacts(s, ws, kin, step.q_middle, ws.contacts.gaps_active, SLOW * h)
+    m = find_contacts(s, ws, kin, step.q_middle, ws.contacts.gaps_active, h)
     found = cycles()
     ledger.find_cycles += found - moved
     step.scalars[0].residual = 0.0
@@ -238,6 +239,7 @@ def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since
         conserve_momentum(s, ws, h, q, v)
     write_correction_bounds(s, kin, q, step.correction, ws.contacts.motion)
     update_kinematics_and_gaps(s, ws, kin, q, v, ws.gaps, h, ws.contacts.gaps_end)
+    update_point_gaps(s, ws, kin, q, h, ws.contacts.gaps_end)
     sum_dolls(s, ws, kin, q, step.sums_after)
     ws.stats[0].work_pushes += (load_potential(s, kin, q, cluster.loads)
                                 - step.scalars[0].start_load_potential)

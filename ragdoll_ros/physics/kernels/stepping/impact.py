@@ -6,7 +6,7 @@ import numpy as np
 from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts, had_met
-from ..contact.gaps import MET, TOUCHING
+from ..contact.gaps import MET, SLOW, SLOW_TURN
 from ..contact.jacobian import contact_velocities
 from ..contact.patch_friction import set_slip_friction
 from ..contact_kind import LIMIT
@@ -22,12 +22,6 @@ from .work import account_kinematic_work
 
 TOLERANCE = 1e-10
 """m/s: tolerance of the contact solve."""
-
-SLOW = 0.02
-"""m/s, and SLOW_TURN rad/s: contacts that close more slowly begin with the next step, without
-restitution; their time of impact is not sought."""
-
-SLOW_TURN = 0.1
 
 
 @compiled
@@ -72,9 +66,10 @@ def impact(s: System, ws: Workspace, cluster: ClusterState, time: float) -> int:
     """
     q, v, kin, dyn, contacts = (cluster.q, cluster.v, ws.step.start, ws.step.dynamics,
                                 ws.contacts.found)
+    ws.step.scalars[0].tracks_points = 0
     forward_kinematics(s.tree, q, v, kin)
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
-    touching = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
+    touching = find_contacts(s, ws, kin, q, ws.gaps, 0.0)
     m = keep_met(s, ws, cluster, kin, touching)
     if m == 0:
         return 0

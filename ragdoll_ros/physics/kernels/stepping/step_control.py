@@ -8,13 +8,13 @@ import numpy as np
 from ..cluster_state import ClusterState
 from ..compiling.cycles import cycles
 from ..compiling.decorators import compiled
-from ..contact.gaps import (BEYOND_LIMIT, TOUCHING, is_joint_limit_gap,
+from ..contact.gaps import (BEYOND_LIMIT, SLOW, TOUCHING, is_joint_limit_gap,
                             update_kinematics_and_gaps)
+from ..contact.point_gaps import has_point_gaps, update_point_gaps
 from ..dynamics.kinematics import integrate_positions
 from ..system import System
 from ..workspace import Workspace
 from .contact_step import MAX_PENETRATION, STEP_TOLERANCE, contact_step, finish_step
-from .impact import SLOW
 from .impact_log import log_impacts
 from .momentum import (REMOVABLE, count_contact_impulses, internal_kinetic_energy, remove_energy,
                        total_energy)
@@ -152,7 +152,7 @@ def begin_trials(s: System, ws: Workspace, cluster: ClusterState, h: float,
     if share < 1 and h > COARSEST * nominal:
         h = max(share * h, COARSEST * nominal)
         predict_contacts(s, ws, cluster, h, nominal)
-    for j in range(len(ws.gaps)):
+    for j in range(ws.gap_counts[0].live):
         if ws.contacts.gaps_end[j] < ws.gaps[j] - ws.contacts.gaps_end[j] or (
                 ws.gaps[j] < SPECULATIVE):
             ws.contacts.gaps_active[j] = min(TOUCHING, ws.gaps[j], ws.contacts.gaps_end[j])
@@ -168,6 +168,7 @@ def predict_contacts(s: System, ws: Workspace, cluster: ClusterState, h: float,
     step, q, v = ws.step, cluster.q, cluster.v
     integrate_positions(s.tree, q, v, h, step.q_end)
     update_kinematics_and_gaps(s, ws, step.end, step.q_end, v, ws.gaps, h, ws.contacts.gaps_end)
+    update_point_gaps(s, ws, step.end, step.q_end, h, ws.contacts.gaps_end)
     return unseen_share(s, ws, UNSEEN_SPEED * nominal)
 
 
@@ -184,6 +185,7 @@ def accept_step(ws: Workspace, cluster: ClusterState, m: int, length: float,
     copy_into(cluster.q, ws.step.q_end)
     copy_into(cluster.v, ws.step.v_end)
     copy_into(ws.gaps, ws.contacts.gaps_end)
+    ws.step.scalars[0].tracks_points = 0
 
 
 @compiled
@@ -199,8 +201,8 @@ def unseen_share(s: System, ws: Workspace, max_depth: float) -> float:
     ``max_depth``, m, or UNSEEN_TURN, if all close evenly; 1 if none is at its end.
     """
     share = 1.0
-    for j in range(len(ws.gaps)):
-        most = UNSEEN_TURN if is_joint_limit_gap(s, ws.gaps, j) else max_depth
+    for j in range(ws.gap_counts[0].live):
+        most = UNSEEN_TURN if is_joint_limit_gap(s, ws, j) else max_depth
         start, end = ws.contacts.gaps_active[j], ws.contacts.gaps_end[j]
         if start > TOUCHING and end < -most:
             share = min(share, SAFETY * (start + most) / (start - end))
@@ -214,11 +216,11 @@ def activate_contacts(s: System, ws: Workspace, h: float) -> bool:
     impulses of the first will close some of them. Returns whether there are any.
     """
     active, end, some = ws.contacts.gaps_active, ws.contacts.gaps_end, False
-    for j in range(len(active)):
+    for j in range(ws.gap_counts[0].live):
         if active[j] > TOUCHING and (end[j] < OVERSHOT or is_fast_impact(s, ws, j, h)):
             some = True
     if some:
-        for j in range(len(active)):
+        for j in range(ws.gap_counts[0].live):
             if active[j] > TOUCHING and end[j] < ws.gaps[j] - end[j]:
                 active[j] = min(end[j], TOUCHING)
     return some
@@ -270,10 +272,10 @@ def penetrates_further(s: System, ws: Workspace) -> bool:
     """Whether a contact of the step, also a speculative one, ends deeper than MAX_PENETRATION or
     BEYOND_LIMIT, and by a tenth of it deeper than at the start.
     """
-    for j in range(len(ws.gaps)):
-        most = BEYOND_LIMIT if is_joint_limit_gap(s, ws.gaps, j) else MAX_PENETRATION
+    for j in range(ws.gap_counts[0].live):
+        most = BEYOND_LIMIT if is_joint_limit_gap(s, ws, j) else MAX_PENETRATION
         end = ws.contacts.gaps_end[j]
         if end < -most and ws.contacts.gaps_active[j] <= TOUCHING and (
-                end < ws.gaps[j] - most / 10):
+                end < ws.gaps[j] - most / 10) and not has_point_gaps(s, ws, j):
             return True
     return False

@@ -14,10 +14,10 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.gaps import EXCLUDED, TOUCHING, first_joint_limit_gap, is_joint_limit_gap
+from ..contact.gaps import (EXCLUDED, SLOW, SLOW_TURN, TOUCHING, first_joint_limit_gap,
+                            is_joint_limit_gap)
 from ..system import System
 from ..workspace import Workspace
-from .impact import SLOW, SLOW_TURN
 
 OVERSHOT = -1e-7
 """m or rad: a gap that is less at a step's end has closed on the way."""
@@ -34,7 +34,7 @@ def is_fast_impact(s: System, ws: Workspace, j: int, h: float) -> bool:
     """Whether gap j, open as the step of h s just taken began, is at most TOUCHING at its end, and
     closed at a mean rate above SLOW or SLOW_TURN.
     """
-    slow = SLOW_TURN if is_joint_limit_gap(s, ws.gaps, j) else SLOW
+    slow = SLOW_TURN if is_joint_limit_gap(s, ws, j) else SLOW
     end = ws.contacts.gaps_end[j]
     return ws.gaps[j] > TOUCHING and end <= TOUCHING and ws.gaps[j] - end > slow * h
 
@@ -45,7 +45,7 @@ def impacts_at_end(s: System, ws: Workspace, h: float) -> tuple[bool, bool, bool
     sought: whether one is overshot at its end; whether there is any; whether any closed fast.
     """
     overshot = landed = fast = False
-    for j in range(len(ws.gaps)):
+    for j in range(ws.gap_counts[0].live):
         quick, end = is_fast_impact(s, ws, j, h), ws.contacts.gaps_end[j]
         if quick or (ws.step.gaps_high[j] < 0 and end <= TOUCHING):
             fast |= quick
@@ -60,7 +60,7 @@ def open_bracket(ws: Workspace) -> None:
     bracket = ws.step.bracket[0]
     bracket.low, bracket.high, bracket.moved = 0.0, math.inf, 0
     bracket.halved_width, bracket.chords = math.inf, 0
-    for j in range(len(ws.gaps)):
+    for j in range(ws.gap_counts[0].live):
         ws.step.gaps_low[j], ws.step.gaps_high[j] = ws.gaps[j], EXCLUDED
 
 
@@ -74,7 +74,7 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
     bracket, low, high, end = (ws.step.bracket[0], ws.step.gaps_low, ws.step.gaps_high,
                                ws.contacts.gaps_end)
     if overshot:
-        for j in range(len(ws.gaps)):
+        for j in range(ws.gap_counts[0].live):
             gap = EXCLUDED
             if end[j] < OVERSHOT and (high[j] < 0 or is_fast_impact(s, ws, j, h)):
                 gap = end[j]
@@ -85,7 +85,7 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
         return h > SHORTEST
     if landed or not bracket.high - h > SHORTEST or h <= bracket.low:
         return False
-    for j in range(len(ws.gaps)):
+    for j in range(ws.gap_counts[0].live):
         if bracket.moved < 0:
             high[j] *= anderson_bjorck_weight(low[j], end[j])
         low[j] = end[j]
@@ -116,10 +116,10 @@ def next_trial_step(s: System, ws: Workspace, v: np.ndarray) -> float:
         bracket.halved_width, bracket.chords = width, 0
     if late:
         return low + width / 2
-    for j in range(len(ws.gaps)):
+    for j in range(ws.gap_counts[0].live):
         if high[j] < 0:
             above = max(0.0, ws.step.gaps_low[j])
-            if not first or not is_joint_limit_gap(s, ws.gaps, j):
+            if not first or not is_joint_limit_gap(s, ws, j):
                 share = min(share, above / (above - high[j]))
             else:
                 share = min(share, parabola_root(
@@ -139,7 +139,7 @@ def parabola_root(start: float, slope: float, end: float) -> float:
 @compiled
 def limit_gap_rate(s: System, ws: Workspace, v: np.ndarray, j: int) -> float:
     """Rate, rad/s, at which gap j, the distance of a joint from a limit, grows at velocities v."""
-    k = j - first_joint_limit_gap(s, ws.gaps)
+    k = j - first_joint_limit_gap(s, ws)
     rate = v[s.joint_limits[k // 2].dof]
     return -rate if k % 2 else rate
 
@@ -149,7 +149,7 @@ def step_to_joint_limit(s: System, ws: Workspace, v: np.ndarray, h: float) -> fl
     """Length of a step, at most h s, at whose end the first joint that approaches a limit fast
     reaches it at its present rate.
     """
-    first = first_joint_limit_gap(s, ws.gaps)
+    first = first_joint_limit_gap(s, ws)
     for j in range(first, first + 2 * len(s.joint_limits)):
         rate = -limit_gap_rate(s, ws, v, j)
         if rate > SLOW_TURN and ws.gaps[j] > TOUCHING and ws.gaps[j] < h * rate:

@@ -13,8 +13,9 @@ from ...compiling.decorators import compiled
 from ...maths.vectors import (Vec3, add, add_scaled, column, dot, neg, put, scale, sub, vec)
 from ..clipping import MAX_CLIPPED, clip_polygon
 from ..convex_manifold import FACE_COSINE, MERGE_RATIO, clip_edges, closest_on_edges
-from ..features import FEATURE_SINE, MAX_CORNERS, face_cosine, supporting_edge, supporting_face
-from ..manifold import CLIP_VERTEX, merge_points, reduce_points
+from ..features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, supporting_edge,
+                        supporting_face)
+from ..manifold import CLIP_VERTEX, merge_points, reduce_points, sort_points
 from ..separating_axis import FACE_BIAS, FACE_BIAS_RATIO
 from ..shapes import BOX, CAPSULE, SPHERE, Shape, bounding_radius
 from .limited_axis import FACE, FIRST_CORNER, LimitedAxis, core_radius, is_beside, limited_axis
@@ -65,6 +66,7 @@ def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -
         count = 1
     distance = MERGE_RATIO * min(bounding_radius(a), bounding_radius(t))
     count = reduce_points(points, merge_points(points, count, margin + radius, distance))
+    sort_points(points, count)
     for i in range(count):
         contact, point = manifold[i], points[i]
         put(contact.point, add(t.position, add_scaled(vec(point.point), -radius / 2, n)))
@@ -115,16 +117,16 @@ def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
     those were left out that the next triangle has.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
-    sides, n, number = scratch[2 * MAX_CLIPPED:], found.normal, 0
+    sides, n, number, face = scratch[2 * MAX_CLIPPED:], found.normal, 0, 0
     if a.kind <= CAPSULE:
         number, half = (1, 0.0) if a.kind == SPHERE else (2, a.size[1])
         for i in range(number):
             put(polygon[i].point, scale(half if i else -half, column(a.rotation, 2)))
     else:
-        number, _ = supporting_face(a, neg(n), (0.0, 0.0, 0.0), polygon)
+        number, face = supporting_face(a, neg(n), (0.0, 0.0, 0.0), polygon)
     for i in range(number):
         put(polygon[i].point, add(vec(polygon[i].point), arm))
-        polygon[i].feature_id = i
+        polygon[i].feature_id = corner_id(a, face, i)
     put_corners(corners, WIDER, sides)
     number = clip_polygon(sides, 4, n, polygon, number, points)
     count = 0

@@ -1,0 +1,153 @@
+"""Gaps of the points of pairs that touch: another point than the first may land in a step.
+
+The ground and planes have a gap for each point that may touch them. Of other shapes the points are
+those of the contact manifold, in a step those of the pairs that touch as it begins: each is known
+by its feature id, and has a gap, after those of all pairs, at the step's start and at the end of
+each trial. A feature that is in the manifold at the end of a trial alone is taken to have had, at
+the start, the gap from which its velocity at the end leads there.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from ..collision.narrow_phase import collide
+from ..collision.shapes import PLANE, TRIANGLE
+from ..compiling.decorators import compiled
+from ..dynamics.kinematics import Kinematics
+from ..maths.vectors import vec
+from ..system import MAX_MANIFOLD_POINTS, System
+from ..workspace import Workspace
+from .gaps import EXCLUDED, FAR, NONE, SLOW, TOUCHING, pair_gap, past_internal_edges
+from .jacobian import normal_velocity
+from .placed_shape import placed_shape
+
+
+@compiled
+def track_points(s: System, ws: Workspace, kin: Kinematics) -> None:
+    """Give gaps to the points of all pairs that touch by ws.gaps, as a step begins: write them to
+    contacts.points, and their gaps to ws.gaps. ``kin``: of the start, with its geoms.
+    """
+    counts, contacts, count = ws.gap_counts[0], ws.contacts, 0
+    first = counts.fixed - len(s.pairs)
+    for k in range(len(s.pairs)):
+        contacts.first_point[k] = NONE
+        if ws.gaps[first + k] > TOUCHING or s.geoms[s.pairs[k].b].kind == PLANE or (
+                count + MAX_MANIFOLD_POINTS > len(contacts.points)):
+            continue
+        contacts.first_point[k] = count
+        found = find_manifold(s, kin, k, contacts.points[count:])
+        for i in range(count, count + found):
+            contacts.point_pair[i] = k
+            ws.gaps[counts.fixed + i] = contacts.points[i].gap
+        count += found
+    counts.live = counts.fixed + count
+    ws.step.scalars[0].start_point_count, ws.step.scalars[0].tracks_points = count, 1
+
+
+@compiled
+def find_manifold(s: System, kin: Kinematics, k: int, manifold: np.ndarray) -> int:
+    """Write the points of pair k that are nearer than FAR to ``manifold``. Returns their number."""
+    return collide(placed_shape(s, kin, s.pairs[k].a), placed_shape(s, kin, s.pairs[k].b), FAR,
+                   manifold)
+
+
+@compiled
+def points_at_start(ws: Workspace, k: int) -> tuple[int, int]:
+    """Index in contacts.points of the first point of pair k as the step began, and of the first
+    that is not.
+    """
+    begin, count = ws.contacts.first_point[k], ws.step.scalars[0].start_point_count
+    end = begin
+    while end < count and ws.contacts.point_pair[end] == k:
+        end += 1
+    return begin, end
+
+
+@compiled
+def find_point(ws: Workspace, k: int, feature_id: int) -> int:
+    """Index in contacts.points of a point of pair k, NONE if it has no gap."""
+    contacts, count = ws.contacts, ws.gap_counts[0].live - ws.gap_counts[0].fixed
+    begin, end = points_at_start(ws, k)
+    for i in range(begin, end):
+        if contacts.points[i].feature_id == feature_id:
+            return i
+    for i in range(ws.step.scalars[0].start_point_count, count):
+        if contacts.points[i].feature_id == feature_id and contacts.point_pair[i] == k:
+            return i
+    return NONE
+
+
+@compiled
+def add_point(ws: Workspace, k: int, at: np.record, rate: float, h: float) -> int:
+    """Give a point of pair k, ``at`` the end of a trial of h s, a gap: one that closes at ``rate``
+    m/s. Returns its index in contacts.points, NONE if there is no room.
+    """
+    counts, contacts = ws.gap_counts[0], ws.contacts
+    i, j = counts.live - counts.fixed, counts.live
+    if j == len(ws.gaps):
+        return NONE
+    contacts.points[i], contacts.point_pair[i] = at, k
+    ws.gaps[j] = contacts.gaps_active[j] = at.gap + rate * h
+    ws.step.gaps_low[j] = at.gap + rate * (h - ws.step.bracket[0].low)
+    ws.step.gaps_high[j] = EXCLUDED
+    counts.live += 1
+    return i
+
+
+@compiled
+def approach_speed(s: System, kin: Kinematics, q: np.ndarray, k: int, at: np.record) -> float:
+    """Speed, m/s, at which a point of pair k closes; ``kin``: of q and the velocities."""
+    point, normal = vec(at.point), vec(at.normal)
+    return (normal_velocity(s, kin, q, s.geoms[s.pairs[k].b].body, point, normal)
+            - normal_velocity(s, kin, q, s.geoms[s.pairs[k].a].body, point, normal))
+
+
+@compiled
+def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, h: float,
+                      out: np.ndarray) -> None:
+    """Write the gaps of pairs that touched as the step began, and of their points, at q, the end of
+    a trial of h s, to ``out``; after update_gaps(). Points that are not found are farther than FAR,
+    and at internal edges none counts. ``kin``: of q and the velocities at the end.
+    """
+    counts, contacts = ws.gap_counts[0], ws.contacts
+    first = counts.fixed - len(s.pairs)
+    for i in range(counts.live - counts.fixed):
+        out[counts.fixed + i] = FAR
+    for k in range(len(s.pairs)):
+        if contacts.first_point[k] == NONE:
+            continue
+        found, gap = find_manifold(s, kin, k, contacts.manifold), EXCLUDED
+        for j in range(found):
+            gap = min(gap, contacts.manifold[j].gap)
+        if found == 0 or s.geoms[s.pairs[k].b].kind == TRIANGLE:
+            gap = pair_gap(s, k, kin)
+        out[first + k] = past_internal_edges(s, ws, kin, k, gap)
+        if out[first + k] > gap:
+            continue
+        for j in range(found):
+            at = contacts.manifold[j]
+            i = find_point(ws, k, at.feature_id)
+            if i == NONE and at.gap <= TOUCHING:
+                i = add_point(ws, k, at, approach_speed(s, kin, q, k, at), h)
+            if i != NONE:
+                out[counts.fixed + i] = at.gap
+
+
+@compiled
+def takes_part(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int, at: np.record,
+               h: float) -> bool:
+    """Whether a point of pair k at the middle of a step of h s, ``at`` of contacts.manifold, is a
+    contact of the step: by its gap in contacts.gaps_active, else if it closes too slowly, or from
+    too near, to be an impact. ``kin``: of q and the velocities there.
+    """
+    i = find_point(ws, k, at.feature_id)
+    if i != NONE:
+        return ws.contacts.gaps_active[ws.gap_counts[0].fixed + i] <= TOUCHING
+    return at.gap + max(0.0, approach_speed(s, kin, q, k, at)) * h / 2 <= SLOW * h
+
+
+@compiled
+def has_point_gaps(s: System, ws: Workspace, j: int) -> bool:
+    """Whether gap j is that of a pair whose points have their own."""
+    k = j - (ws.gap_counts[0].fixed - len(s.pairs))
+    return 0 <= k < len(s.pairs) and ws.contacts.first_point[k] != NONE
