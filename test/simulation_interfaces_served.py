@@ -533,7 +533,8 @@ def test_what_cannot_be_spawned_is_refused_with_the_standard_s_code(node, call, 
 def test_spawnables_are_the_dolls_and_can_be_spawned(node, call):
     listed = call('GetSpawnables')
     uris = [getattr(each, 'entity_resource', each).uri for each in listed.spawnables]
-    assert code(listed) == 1 and uris == ['article_doll', 'character', 'doll', 'man', 'woman']
+    assert code(listed) == 1 and uris == [
+        'article_doll', 'character', 'doll', 'man', 'walker', 'woman']
     for index, (uri, each) in enumerate(zip(uris, listed.spawnables, strict=True)):
         response = call('SpawnEntity', allow_renaming=True, **spawned(uri), initial_pose={
             'pose': {'position': {'x': -3.0 - index, 'z': 2.0}}})
@@ -542,8 +543,9 @@ def test_spawnables_are_the_dolls_and_can_be_spawned(node, call):
                                    [[p.x, p.y, p.z] for p in each.spawn_bounds.points], atol=1e-9)
     robots = call('GetSpawnables', sources=[(ROOT / 'config').as_uri(), 'model://nothing'])
     assert code(robots) == 1 and 'model://nothing' in robots.result.error_message
-    uris = [getattr(each, 'entity_resource', each).uri for each in robots.spawnables[5:]]
-    assert uris == [(ROOT / 'config' / name).as_uri() for name in ('character.glb', 'robot.urdf')]
+    uris = [getattr(each, 'entity_resource', each).uri for each in robots.spawnables[6:]]
+    assert uris == [(ROOT / 'config' / name).as_uri()
+                    for name in ('character.glb', 'robot.urdf', 'walker.glb')]
     for uri in uris:
         response = call('SpawnEntity', allow_renaming=True, **spawned(uri), initial_pose={
             'pose': {'position': {'x': -20.0, 'y': len(uri) / 2, 'z': 2.0}}})

@@ -52,7 +52,7 @@ class Sender:
             (Wrench, '/ragdoll/force'), (Twist, '/cmd_vel'), (WrenchStamped, '/ragdoll/push'),
             (InteractiveMarkerFeedback, '/ragdoll/interactive/feedback'))]
         self.services = {name: peer.create_client(kind, f'ragdoll/{name}') for name, kind in (
-            ('reset', Trigger), ('step', Trigger), ('pause', SetBool),
+            ('reset', Trigger), ('step', Trigger), ('go_limp', Trigger), ('pause', SetBool),
             ('set_parameters', SetParameters))}
         for client in self.services.values():
             peer.wait(client.service_is_ready)

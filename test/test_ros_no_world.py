@@ -85,7 +85,8 @@ def test_what_is_asked_of_it_is_refused_with_a_sentence(make_node, peer, tmp_pat
         senders[name].publish(message_for(kind))
         peer.wait(lambda source=source: node.input_counts.refused[source])
         assert 'no world is loaded: load one' in node.input_counts.last_reason, source
-    for kind, name in ((Trigger, 'reset'), (Trigger, 'step'), (SetBool, 'pause')):
+    for kind, name in ((Trigger, 'reset'), (Trigger, 'step'), (Trigger, 'go_limp'),
+                       (SetBool, 'pause')):
         answer = peer.call(kind, f'/ragdoll/{name}', kind.Request())
         assert not answer.success and 'no world is loaded' in answer.message
     answer = peer.call(GetInteractiveMarkers, '/ragdoll/interactive/get_interactive_markers',

@@ -189,7 +189,7 @@ def test_a_robot_and_a_character_are_what_the_fit_makes_of_them():
 
 def test_spawnables_are_the_dolls_in_config_and_what_folders_hold(tmp_path):
     assert {each.uri for each in shipped()} == {
-        'article_doll', 'character', 'doll', 'man', 'woman'}
+        'article_doll', 'character', 'doll', 'man', 'walker', 'woman'}
     heights = {each.uri: np.ptp(each.box, axis=0)[2] for each in shipped()}
     assert 1.5 < heights['woman'] < heights['man'] < 1.9
     for name in ('a robot.urdf', 'b.GLB', 'notes.txt'):

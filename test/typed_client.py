@@ -113,6 +113,11 @@ def main(folder: Path) -> None:
     starts: list[Placement] = [animation.place(Placement(character), animation.duration)
                                for animation in load_animations(character).values()]
     assert not starts
+    walker = load_doll('walker')
+    walks: Placement = load_animations(walker)['walk'].play(Placement(walker), loop=True)
+    with Simulation(Scene('walk', (walks,))) as simulation:
+        animated: tuple[str, ...] = simulation.animated
+        simulation.go_limp(animated[0])
     rows: tuple[int, ...] = state.positions.shape
     assert rows == (len(scene.bone_names), 3) and state.linear_velocities.shape == rows
     assert ends([scene, scene])[1].shape == (rows[0], 13)

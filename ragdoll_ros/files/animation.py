@@ -8,27 +8,36 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 import os
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..model import errors, rotation
+from ..model.dof_layout import DofLayout, GeneralizedState
 from ..model.forward_kinematics import BoneMotion
-from ..model.inverse_kinematics import FollowedMotion, follow_motions
+from ..model.inverse_kinematics import FollowedMotion, follow_motions, follow_turns
+from ..model.motion_spline import MotionSpline
+from ..model.playback import Playback
 from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll, SkeletonFrame
 from ..model.scene import Placement
 from .gltf.bones import Bones, read_bones, unique_names
 from .gltf.gltf_file import GltfFile
 from .gltf.nodes import TO_ROS, Nodes, read_nodes
-from .gltf.tracks import NodeAnimation, read_animations
+from .gltf.tracks import KEY_TOLERANCE, NodeAnimation, read_animations
 
 SMALLEST = 1e-30
 """Determinant of a bind pose, as of inverse bind matrices."""
 
 LARGEST = 1e9
 """Of a transform in m, and of its rate, above which an animation is broken."""
+
+
+SAMPLE_RATE, MOST_SAMPLES = 60.0, 100_000
+"""Samples of a motion per s at least, and in all: 20 min. Of a swing by 0.5 rad at 1.2 Hz, splines
+through 60 samples per s miss the velocity by less than 1e-4 rad/s."""
 
 
 @dataclass(frozen=True)
@@ -78,25 +87,47 @@ class Animation:
         for a broken track.
         """
         errors.check_range('time', time, 0.0, self.duration)
+        return follow_motions(self.doll, self._bone_motions(np.array(time)))
+
+    @functools.cached_property
+    def motion(self) -> MotionSpline:
+        """The doll's motion in the doll's frame: splines through samples at the keys of the file
+        and at least SAMPLE_RATE times a second. Raises a ModelError for a broken track.
+        """
+        tracks = self._source.animations[self.name].tracks.values()
+        keys = np.unique(np.concatenate([[0.0, self.duration], *(each.times for each in tracks)]))
+        keys = keys[np.append(np.diff(keys) > KEY_TOLERANCE, True)]
+        counts = np.ceil(np.diff(keys) * SAMPLE_RATE - 1e-3).astype(int).clip(1)
+        if counts.sum() >= MOST_SAMPLES:
+            raise errors.OutOfRange(f'{self.name}.duration', self.duration,
+                                    f'an animation of at most {MOST_SAMPLES} samples')
+        times = np.concatenate([keys[:1], *(
+            np.linspace(begin, end, count + 1)[1:]
+            for begin, end, count in zip(keys[:-1], keys[1:], counts, strict=True))])
+        motions = self._bone_motions(times)
+        return MotionSpline.sampled(*_coordinates(self.doll, times, motions))
+
+    def _bone_motions(self, times: np.ndarray) -> dict[str, BoneMotion]:
+        """Motions of the bodies as their bones move, at ``times`` (...), in the doll's frame."""
         # Overflow shows in the results, which are checked.
         with np.errstate(over='ignore', invalid='ignore'):
-            both = np.array(self._source.animations[self.name].worlds(self._source.nodes, time))
-        motions = {}
-        for carrier in self._carriers:
-            moved, rate = self._to_doll @ both[:, carrier.node] @ carrier.from_bind
-            largest = max(np.abs(moved).max(), np.abs(rate).max())
-            if not largest < LARGEST:
-                raise errors.OutOfRange(f'{self.name}.{carrier.body}', float(largest),
-                                        f'transforms of at most {LARGEST:g}, m, and per s')
-            place = np.append(carrier.pose.position, 1.0)
-            orientation = rotation.multiply(rotation.nearest_rotation(moved[:3, :3]),
-                                            carrier.pose.orientation)
-            motions[carrier.body] = BoneMotion(
-                rotation.multiply(orientation, rotation.inverse(
-                    self.doll.bone(carrier.body).orientation)),
-                moved[:3] @ place, rate[:3] @ place,
-                rotation.nearest_rotation_spin(moved[:3, :3], rate[:3, :3]))
-        return follow_motions(self.doll, motions)
+            both = np.array(self._source.animations[self.name].worlds(self._source.nodes, times))
+            motions = {}
+            for carrier in self._carriers:
+                moved, rate = self._to_doll @ both[:, carrier.node] @ carrier.from_bind
+                largest = max(np.abs(moved).max(), np.abs(rate).max())
+                if not largest < LARGEST:
+                    raise errors.OutOfRange(f'{self.name}.{carrier.body}', float(largest),
+                                            f'transforms of at most {LARGEST:g}, m, and per s')
+                place = np.append(carrier.pose.position, 1.0)
+                orientation = rotation.multiply(rotation.nearest_rotation(moved[..., :3, :3]),
+                                                carrier.pose.orientation)
+                motions[carrier.body] = BoneMotion(
+                    rotation.multiply(orientation, rotation.inverse(
+                        self.doll.bone(carrier.body).orientation)),
+                    moved[..., :3, :] @ place, rate[..., :3, :] @ place,
+                    rotation.nearest_rotation_spin(moved[..., :3, :3], rate[..., :3, :3]))
+        return motions
 
     def place(self, placement: Placement, time: float) -> Placement:
         """The doll of ``placement`` as the animation has it at ``time`` s, with its velocities.
@@ -106,6 +137,39 @@ class Animation:
         a spin, angles or rates.
         """
         return placed(placement, self.at(time))
+
+    def play(self, placement: Placement, start: float = 0.0, speed: float = 1.0,
+             loop: bool = False, limp_at: float = math.inf,
+             limp_above: float = math.inf) -> Placement:
+        """The doll of ``placement``, which the animation moves until it goes limp: see Playback.
+
+        Position, orientation and velocity of the placement are those of the animation's frame.
+        Raises OutOfRange or NotPositive for a number, WrongForm for a placement of another doll or
+        with a spin, angles or rates.
+        """
+        return dataclasses.replace(placement, animation=Playback(
+            self.name, self.motion, start, speed, loop, limp_at, limp_above))
+
+
+def _coordinates(doll: Ragdoll, times: np.ndarray, motions: dict[str, BoneMotion]
+                 ) -> tuple[DofLayout, np.ndarray, list[GeneralizedState]]:
+    """Layout, ``times`` (k,), and coordinates of the doll as it follows ``motions``, stacked."""
+    layout, root, found = DofLayout([doll]), motions[doll.root.name], follow_turns(doll, motions)
+    names = [name for joint in doll.joints for name in joint.angle_names]
+    zero = np.zeros(len(times))
+    angles, rates = (np.array([found[name][key] if name in found else zero for name in names]
+                              ).reshape(len(names), len(times)) for key in (0, 1))
+    orientations = rotation.multiply(root.turn, np.array(doll.root.orientation))
+    samples = []
+    for k in range(len(times)):
+        q, v = np.zeros(layout.sizes[0]), np.zeros(layout.sizes[1])
+        q[layout.root_positions[0]] = root.position[k]
+        q[layout.root_orientations[0]] = orientations[k]
+        v[layout.root_velocities[0]] = root.velocity[k]
+        v[layout.root_angular_velocities[0]] = root.spin[k]
+        state = GeneralizedState(layout.with_joint_angles(q, angles[:, k]), v)
+        samples.append(GeneralizedState(state.q, layout.with_joint_rates(state, rates[:, k])))
+    return layout, times, samples
 
 
 def placed(placement: Placement, motion: FollowedMotion) -> Placement:

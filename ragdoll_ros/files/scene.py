@@ -37,6 +37,9 @@ MOST_DOLLS = 1000
 ANGLE_KEYS = {'angles': 'angles_deg', 'rates': 'rates_deg_s'}
 """Key of a doll's entry for each field of a Placement that is in rad or rad/s."""
 
+PLAYBACK_KEYS = ('start', 'speed', 'loop', 'limp_at', 'limp_above')
+"""Keys of an ``animation`` that moves a doll: fields of a Playback."""
+
 
 def load_scene(name: str) -> Scene:
     """Read a scene from a YAML file.
@@ -157,6 +160,10 @@ def scene_data(scene: Scene, folder: Path | None = None,
                               for angle, value in values.items()}
         if placement.follow:
             entry['follow'] = follow_data(placement.follow)
+        if placement.animation:
+            played = {key: getattr(placement.animation, key) for key in ('name', *PLAYBACK_KEYS)}
+            entry['animation'] = {key: value for key, value in played.items() if value != math.inf}
+            del entry['spin']
         data['dolls'].append(entry)
     if scene.bodies:
         data['bodies'] = [body_data(body) for body in scene.bodies]
@@ -192,8 +199,8 @@ def _placement(doll: Ragdoll, entry: dict) -> Placement:
 
 
 def _animated(copies: list[Placement], entry: dict) -> list[Placement]:
-    """The copies of a doll as its entry's animation has them at its time."""
-    for key in ('spin', *ANGLE_KEYS.values()):
+    """The copies of a doll with its entry's animation, or limp as it has them at its ``time``."""
+    for key in ('spin', 'follow', *ANGLE_KEYS.values()):
         if key in entry:
             raise WrongForm(key, entry[key], 'none: the animation has its own')
     wanted, doll = entry['animation'], copies[0].doll
@@ -208,11 +215,17 @@ def _animated(copies: list[Placement], entry: dict) -> list[Placement]:
         known = one_of(list(animations), name) if animations else (
             f'no animation: {Path(doll.model or "").name} has none')
         raise UnknownAnimation('animation.name', name, known)
+    playing = {key: wanted[key] for key in PLAYBACK_KEYS if key in wanted}
+    if 'time' in wanted and playing:
+        raise WrongForm('animation.time', wanted['time'], 'either time, to start limp, or '
+                        + ', '.join(playing))
     try:
-        motion = animations[name].at(wanted.get('time', 0.0))
+        if 'time' in wanted:
+            motion = animations[name].at(wanted['time'])
+            return [placed(copy, motion) for copy in copies]
+        return [animations[name].play(copy, **playing) for copy in copies]
     except ModelError as error:
         raise error.at('animation') from None
-    return [placed(copy, motion) for copy in copies]
 
 
 def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:

@@ -62,7 +62,7 @@ def scene_to_urdf(scene: Scene, frame: str = WORLD, trees: PerDoll[str] | None =
         lines += [f'  <joint name={name} type="floating">',
                   f'    <parent link={_quoted(frame)}/>',
                   f'    <child link={name}/>',
-                  f'    {_origin(position, np.array(placement.orientation))}', '  </joint>',
+                  f'    {_origin(position, np.array(placement.start.orientation))}', '  </joint>',
                   tree.replace(DOLL_NAME, scene.qualified(placement, '').translate(ESCAPES))]
     return _document(scene.name, lines)
 

@@ -50,27 +50,36 @@ def follow_motions(doll: Ragdoll, motions: Mapping[str, BoneMotion]) -> Followed
 
     The root needs one; a joint whose child has none stays at zero.
     """
-    turns, spins = {doll.root.name: motions[doll.root.name].turn}, {
-        doll.root.name: motions[doll.root.name].spin}
-    angles: dict[str, float] = {}
-    rates: dict[str, float] = {}
-    clipped: list[str] = []
+    found = follow_turns(doll, motions)
+    angles, rates = ({name: float(each[key]) for name, each in found.items()} for key in (0, 1))
+    clipped = tuple(name for name, (_, _, is_clipped) in found.items() if is_clipped)
+    return _followed(doll, motions, angles, rates, clipped)
+
+
+def follow_turns(doll: Ragdoll, motions: Mapping[str, BoneMotion]
+                 ) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Joint angles (...), rad, at which a doll follows the rotations of its bones, with their
+    rates, rad/s, and whether they are clipped, by name; for stacked motions, turns (..., 4) and
+    spins (..., 3).
+    """
+    root = motions[doll.root.name]
+    turns, spins, found = {doll.root.name: root.turn}, {doll.root.name: root.spin}, {}
     for joint in doll.joints_depth_first():
         turn, spin = turns[joint.parent], spins[joint.parent]
         if joint.child in motions:
             wished = motions[joint.child]
             back = rotation.inverse(turn)
-            found = _joint_angles(joint, rotation.multiply(back, wished.turn),
-                                  rotation.rotate(back, wished.spin - spin))
-            for name, limits, (angle, rate) in zip(joint.angle_names, _limits(joint), found,
+            each = _joint_angles(joint, rotation.multiply(back, wished.turn),
+                                 rotation.rotate(back, wished.spin - spin))
+            for name, limits, (angle, rate) in zip(joint.angle_names, _limits(joint), each,
                                                    strict=True):
-                angles[name], rates[name], is_clipped = _clip(angle, rate, limits)
-                clipped += [name] * is_clipped
+                found[name] = _clip(angle, rate, limits)
         for name, axis in zip(joint.angle_names, joint_axes(joint), strict=True):
-            spin = spin + rates.get(name, 0.0) * rotation.rotate(turn, axis)
-            turn = rotation.multiply(turn, rotation.from_axis_angle(axis, angles.get(name, 0.0)))
+            angle, rate, _ = found.get(name, (np.zeros(turn.shape[:-1]),) * 3)
+            spin = spin + rate[..., None] * rotation.rotate(turn, axis)
+            turn = rotation.multiply(turn, rotation.from_rotation_vector(angle[..., None] * axis))
         turns[joint.child], spins[joint.child] = turn, spin
-    return _followed(doll, motions, angles, rates, tuple(clipped))
+    return found
 
 
 def _followed(doll: Ragdoll, motions: Mapping[str, BoneMotion], angles: dict[str, float],
@@ -87,12 +96,13 @@ def _followed(doll: Ragdoll, motions: Mapping[str, BoneMotion], angles: dict[str
     return FollowedMotion(pose, velocity, root.spin, angles, rates, distances, clipped)
 
 
-def _joint_angles(joint: Joint, turn: np.ndarray, spin: np.ndarray) -> list[tuple[float, float]]:
-    """Angle, rad, and rate, rad/s, about each axis, of the child relative to the parent.
+def _joint_angles(joint: Joint, turn: np.ndarray,
+                  spin: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Angle (...), rad, and rate, rad/s, about each axis, of the child relative to the parent.
 
-    ``turn`` (4,) since the bind pose and ``spin`` (3,) rad/s are in the parent's bind axes. What
-    the axes do not allow is left out: of a hinge the swing of the swing-twist decomposition, of a
-    universal joint the last of three angles.
+    ``turn`` (..., 4) since the bind pose and ``spin`` (..., 3) rad/s are in the parent's bind axes.
+    What the axes do not allow is left out: of a hinge the swing of the swing-twist decomposition,
+    of a universal joint the last of three angles.
     """
     axes = joint_axes(joint)
     if len(axes) == 0:
@@ -102,33 +112,43 @@ def _joint_angles(joint: Joint, turn: np.ndarray, spin: np.ndarray) -> list[tupl
     if len(axes) == 2:
         axes = np.array([*axes, np.cross(*axes)])
     frame = rotation.from_matrix(axes.T)
-    local = rotation.multiply(rotation.inverse(frame), rotation.multiply(turn, frame))
-    angles = rotation.to_euler_xyz(local)
+    r = rotation.matrix(rotation.multiply(rotation.inverse(frame), rotation.multiply(turn, frame)))
+    first, third = np.arctan2(-r[..., 1, 2], r[..., 2, 2]), np.arctan2(-r[..., 0, 1], r[..., 0, 0])
+    second = np.arcsin(r[..., 0, 2].clip(-1.0, 1.0))
     body_spin = rotation.rotate(rotation.inverse(rotation.multiply(turn, frame)), spin)
-    near = (angles[0], math.copysign(min(abs(angles[1]), LARGEST_SWING), angles[1]), angles[2])
-    rates = rotation.euler_xyz_rates(near, body_spin)
-    return list(zip(angles, rates.tolist(), strict=True))[:joint.dof]
+    # Rates of rotation.euler_xyz_rates(), stacked.
+    near, (x, y, z) = second.clip(-LARGEST_SWING, LARGEST_SWING), np.moveaxis(body_spin, -1, 0)
+    first_rate = (x * np.cos(third) - y * np.sin(third)) / np.cos(near)
+    rates = (first_rate, x * np.sin(third) + y * np.cos(third), z - first_rate * np.sin(near))
+    return list(zip((first, second, third), rates, strict=True))[:joint.dof]
 
 
-def _twist(axis: np.ndarray, turn: np.ndarray, spin: np.ndarray) -> tuple[float, float]:
+def _twist(axis: np.ndarray, turn: np.ndarray,
+           spin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rotation about ``axis`` nearest to ``turn``, and its rate: 2 atan(turn . axis / w)."""
-    along, w = turn[:3] @ axis, turn[3]
-    changes = rotation.multiply(np.append(spin, 0.0), turn) / 2
+    along, w = turn[..., :3] @ axis, turn[..., 3]
+    spins = np.concatenate([spin, np.zeros((*spin.shape[:-1], 1))], axis=-1)
+    changes = rotation.multiply(spins, turn) / 2
     norm = along * along + w * w
-    rate = 2 * (w * (changes[:3] @ axis) - along * changes[3]) / norm if norm > 1e-12 else 0.0
-    return math.remainder(2 * math.atan2(along, w), math.tau), float(rate)
+    rate = 2 * (w * (changes[..., :3] @ axis) - along * changes[..., 3]) / np.maximum(norm, 1e-300)
+    angle = 2 * np.arctan2(along, w)
+    return (angle - math.tau * np.round(angle / math.tau), np.where(norm > 1e-12, rate, 0.0))
 
 
 def _limits(joint: Joint) -> tuple[Limits | None, ...]:
     return (None,) * joint.dof if joint.is_free_ball else joint.angle_limits
 
 
-def _clip(angle: float, rate: float, limits: Limits | None) -> tuple[float, float, bool]:
-    """Angle within its limits, its rate, and whether it had to be clipped by more than rounding."""
+def _clip(angle: np.ndarray, rate: np.ndarray,
+          limits: Limits | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Angles within their limits, their rates, and whether they had to be clipped by more than
+    rounding.
+    """
     if limits is None:
-        return angle, rate, False
+        return angle, rate, np.zeros(angle.shape, bool)
     lower, upper = limits
-    angle = min((angle, angle - math.tau, angle + math.tau),
-                key=lambda each: max(lower - each, each - upper, 0.0))
-    excess = max(lower - angle, angle - upper)
-    return min(max(angle, lower), upper), rate if excess <= 0 else 0.0, excess > CLIP_TOLERANCE
+    turned = angle + math.tau * np.array((0.0, -1.0, 1.0)).reshape(-1, *[1] * angle.ndim)
+    nearest = np.argmin(np.maximum(np.maximum(lower - turned, turned - upper), 0.0), axis=0)
+    angle = np.take_along_axis(turned, nearest[None], axis=0)[0]
+    excess = np.maximum(lower - angle, angle - upper)
+    return angle.clip(lower, upper), np.where(excess <= 0, rate, 0.0), excess > CLIP_TOLERANCE

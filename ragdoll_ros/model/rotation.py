@@ -123,27 +123,32 @@ def from_matrix(r: ArrayLike) -> np.ndarray:
 
 
 def nearest_rotation(matrix: ArrayLike) -> np.ndarray:
-    """Quaternion (4,) of the rotation nearest to a matrix (3, 3) with scale or reflection."""
+    """Quaternions (..., 4) of the rotations nearest to matrices (..., 3, 3) with scale or
+    reflection.
+    """
     u, _, vt = np.linalg.svd(matrix)
-    if np.linalg.det(u @ vt) < 0:
-        u = u * (1.0, 1.0, -1.0)
+    mirrored = np.linalg.det(u @ vt) < 0
+    if mirrored.any():
+        u = np.where(mirrored[..., None, None], u * (1.0, 1.0, -1.0), u)
     return from_matrix(u @ vt)
 
 
 def nearest_rotation_spin(changed: ArrayLike, rate: ArrayLike) -> np.ndarray:
-    """Angular velocity (3,) of nearest_rotation() of a matrix A (3, 3), outer axes.
+    """Angular velocities (..., 3) of nearest_rotation() of matrices A (..., 3, 3), outer axes.
 
     ``rate`` is dA/dt. With A = R P, P symmetric, and the spin w in the body's axes,
     R^T dA/dt - its transpose = [w] P + P [w] = [(trace(P) - P) w]. Where the nearest rotation is
     not unique, as of zero, the smallest of all.
     """
     r = matrix(nearest_rotation(changed))
-    stretch = r.T @ np.asarray(changed, float)
-    turned = r.T @ np.asarray(rate, float)
-    odd = turned - turned.T
-    body = np.linalg.lstsq(np.trace(stretch) * np.eye(3) - (stretch + stretch.T) / 2,
-                           np.array((odd[2, 1], odd[0, 2], odd[1, 0])), rcond=None)
-    return r @ body[0]
+    back = np.swapaxes(r, -1, -2)
+    stretch, turned = back @ np.asarray(changed, float), back @ np.asarray(rate, float)
+    odd = turned - np.swapaxes(turned, -1, -2)
+    trace = np.trace(stretch, axis1=-2, axis2=-1)[..., None, None]
+    body = np.linalg.pinv(trace * np.eye(3) - (stretch + np.swapaxes(stretch, -1, -2)) / 2,
+                          rcond=1e-15, hermitian=True) @ np.stack(
+        [odd[..., 2, 1], odd[..., 0, 2], odd[..., 1, 0]], axis=-1)[..., None]
+    return (r @ body)[..., 0]
 
 
 def from_axis_angle(axis: ArrayLike, angle: float) -> np.ndarray:

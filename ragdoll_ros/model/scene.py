@@ -15,6 +15,7 @@ from . import errors, rotation
 from .errors import set_fields
 from .follow import Follow
 from .forward_kinematics import BoneMotion, bone_motions
+from .playback import Playback
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
 from .rotation import IDENTITY
@@ -108,10 +109,14 @@ class Placement:
             They are rounded to 1e-9 degrees, so that files in degrees read back to the same bits.
         rates: initial rates of joint angles, rad/s; rounded likewise.
         follow: how a doll of one bone follows Simulation.drive_body(); None: it does not.
+        animation: what moves the doll until it goes limp, see Animation.play(). Position,
+            orientation and velocity are then those of the animation's frame; spin, angles and rates
+            are its own.
 
     Raises:
         NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none; for ``follow`` of a
-            doll of several bones, or with a velocity of what follows exactly.
+            doll of several bones, or with a velocity of what follows exactly; for a spin, angles,
+            rates or ``follow`` beside an animation, or an animation of another doll.
         UnknownJoint, OutOfRange: for an angle that the doll does not have, or outside its limits.
 
     Example:
@@ -128,6 +133,7 @@ class Placement:
     angles: Mapping[str, float] = field(default_factory=dict, hash=False)
     rates: Mapping[str, float] = field(default_factory=dict, hash=False)
     follow: Follow | None = None
+    animation: Playback | None = field(default=None, hash=False)
 
     def __post_init__(self) -> None:
         for key in ('position', 'velocity', 'spin'):
@@ -142,14 +148,28 @@ class Placement:
             if any(getattr(self, key)):
                 raise errors.WrongForm(key, getattr(self, key), 'none: what follows exactly stands '
                                        'until drive_body() moves it')
+        if self.animation is not None:
+            self._check_animation(self.animation)
 
     @property
     def is_kinematic(self) -> bool:
         """Whether it moves as it is told, whatever acts on it."""
         return self.follow is not None and self.follow.is_exact
 
+    @cached_property
+    def start(self) -> 'Placement':
+        """The doll as its animation has it at the start; itself without one."""
+        return self if self.animation is None else _started(self, self.animation)
+
+    @property
+    def is_posed(self) -> bool:
+        """Whether it starts with joint angles or rates."""
+        return bool(self.angles or self.rates or self.animation)
+
     def bone_pose(self, bone: Bone) -> Pose:
         """Initial pose of a bone, world frame."""
+        if self.animation is not None:
+            return self.start.bone_pose(bone)
         here = self._motions[bone.name].pose(bone) if self.angles else bone.pose
         return Pose(np.array(self.position), np.array(self.orientation)).compose(here)
 
@@ -161,7 +181,8 @@ class Placement:
     @cached_property
     def root_motion(self) -> tuple[Pose, np.ndarray]:
         """Initial pose of the root, and velocity (3,) m/s of its centre of mass, world frame."""
-        return self.bone_pose(self.doll.root), self.root_velocity()
+        start = self.start
+        return start.bone_pose(self.doll.root), start.root_velocity()
 
     def root_velocity(self) -> np.ndarray:
         """Initial velocity (3,) m/s of the root's centre of mass, world frame."""
@@ -171,6 +192,17 @@ class Placement:
             moved -= rotation.rotate(self.orientation, self._mean('velocity'))
         return moved
 
+    def _check_animation(self, animation: Playback) -> None:
+        for key in ('spin', 'angles', 'rates'):
+            if (values := getattr(self, key)) and any(values):
+                raise errors.WrongForm(key, values, 'none: the animation has its own')
+        if self.follow is not None:
+            raise errors.WrongForm('follow', self.follow, 'none: the animation moves the doll')
+        sizes = (7 + sum(4 if joint.is_free_ball else joint.dof for joint in self.doll.joints),
+                 6 + sum(joint.dof for joint in self.doll.joints))
+        if animation.motion.layout.sizes != sizes:
+            raise errors.WrongForm('animation', animation.name, 'an animation of this doll')
+
     def _mean(self, key: str) -> np.ndarray:
         """Mean of a field of the bones' motions, weighted by their masses."""
         return np.average([getattr(self._motions[bone.name], key) for bone in self.doll.bones],
@@ -179,6 +211,26 @@ class Placement:
     @cached_property
     def _motions(self) -> dict[str, BoneMotion]:
         return bone_motions(self.doll, self.angles, self.rates)
+
+
+def _started(placement: Placement, animation: Playback) -> Placement:
+    """The placement as its animation has it at the start, without the animation."""
+    alone, doll = replace(placement, animation=None), placement.doll
+    state = animation.at(Pose(np.array(alone.position), np.array(alone.orientation)),
+                         np.array(alone.velocity), 0.0)
+    q, layout = state.q, animation.motion.layout
+    root = Pose(q[layout.root_positions[0]], q[layout.root_orientations[0]])
+    frame = root.compose(doll.root.pose.relative(Pose()))
+    names = [name for joint in doll.joints for name in joint.angle_names]
+    resting = replace(
+        alone, position=tuple(frame.position.tolist()), velocity=(0.0, 0.0, 0.0),
+        orientation=tuple(frame.orientation.tolist()),
+        spin=tuple(state.v[layout.root_angular_velocities[0]].tolist()),
+        angles=dict(zip(names, layout.joint_angles(q).tolist(), strict=True)),
+        rates=dict(zip(names, layout.joint_rates(state).tolist(), strict=True)))
+    # A placement's velocity is that of the centre of mass, that of coordinates the root's.
+    velocity = state.v[layout.root_velocities[0]] - resting.root_velocity()
+    return replace(resting, velocity=tuple(velocity.tolist()))
 
 
 def checked_angles(doll: Ragdoll, key: str, given: Mapping[str, float]) -> dict[str, float]:

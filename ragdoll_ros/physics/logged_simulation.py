@@ -15,6 +15,7 @@ from ..model import errors
 from ..model.coordinates import GeneralizedState
 from ..model.drive import Drive
 from ..model.push import Push
+from ..model.scene import SECOND
 from ..model.state import State
 from .accuracy import Accuracy
 from .actions.grab import DRAG_TIME
@@ -86,9 +87,14 @@ class LoggedSimulation(Simulation):
                                'damping': float(damping),
                                'target': None if target is None else float(target)})
 
-    def go_limp(self, angles: Sequence[str] | None = None) -> None:
+    def go_limp(self, angles: str | Sequence[str] | None = None) -> None:
         super().go_limp(angles)
-        self.on_event('go_limp', {'angles': None if angles is None else list(angles)})
+        self.on_event('go_limp', {'angles': angles if angles is None or isinstance(angles, str)
+                                  else list(angles)})
+
+    def _went_limp(self, dolls: Sequence[str], reason: str) -> None:
+        # For information: what a scene and its actions say happens again by itself.
+        self.on_event('limp', {'dolls': list(dolls), 'time': self.time / SECOND, 'reason': reason})
 
     def place(self, coordinates: GeneralizedState) -> State:
         # place() includes a reset(), which is no event of its own.

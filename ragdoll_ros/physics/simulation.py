@@ -21,6 +21,7 @@ from ..model.scene_change import SceneChange
 from ..model.state import State
 from ..model.vectors import finite_floats, unit_vector
 from .accuracy import Accuracy, resolve_accuracy
+from .actions.animations import Animations
 from .actions.driven_bodies import DrivenBodies
 from .actions.grab import DRAG_TIME, Grab, Hands, checked_point
 from .actions.joint_springs import JointSpring, JointSprings
@@ -106,10 +107,12 @@ class Simulation:
         self._impact_recorder: ImpactRecorder | None = None
         self._placed: GeneralizedState | None = None
         self._overlaps: tuple[Overlap, ...] | None = None
-        if any(placement.angles or placement.rates for placement in scene.dolls):
+        if any(placement.is_posed for placement in scene.dolls):
             self._placed = placed_coordinates(scene.dolls)
         self._engine = self._make_engine(resolve_accuracy(accuracy))
         self._follows = any(placement.follow for placement in scene.dolls)
+        self._plays = True
+        """Whether animations begin at each reset(); not after place()."""
         self._start = self._engine.save()
         self._sleep_detector = SleepDetector(scene)
         self._stability_test = StabilityTest(scene, self._engine.layout)
@@ -409,11 +412,33 @@ class Simulation:
         self._require(Capability.JOINT_SPRINGS)
         self._joint_springs.hold(angle, stiffness, damping, target, self.joint_angles)
 
-    def go_limp(self, angles: Sequence[str] | None = None) -> None:
-        """Remove the springs of joint angles; None: of all. Raises UnknownJoint.
+    @property
+    def animated(self) -> tuple[str, ...]:
+        """Names of the dolls that their animations move."""
+        return tuple(self.scene.dolls[doll].name for doll in self._animations.dolls)
+
+    def go_limp(self, angles: str | Sequence[str] | None = None) -> None:
+        """Let a doll go limp: end its animation, from which it falls with the pose and velocities
+        of this instant, and remove the springs of its joint angles.
+
+        Args:
+            angles: the name of a doll; or names of joint angles, whose springs alone are removed;
+                None: all dolls.
+
+        Raises:
+            UnknownDoll, UnknownJoint: the scene has none of this name.
 
         >>> simulation.go_limp(['left_shin'])
+        >>> simulation.go_limp('doll')
         """
+        if isinstance(angles, str):
+            doll = self._doll_index(angles)
+            placement = self.scene.dolls[doll]
+            self._release([doll], 'go_limp')
+            angles = [self.scene.qualified(placement, name) for joint in placement.doll.joints
+                      for name in joint.angle_names]
+        elif angles is None:
+            self._release(self._animations.dolls, 'go_limp')
         self._joint_springs.go_limp(angles)
 
     def advance(self) -> State:
@@ -427,13 +452,16 @@ class Simulation:
         for sample in range(1, self._samples_per_tick + 1):
             end = begin + self.tick * sample // self._samples_per_tick
             if self.asleep and not self._pushes and not self._springs and not (
-                    self._follows and self._driven.moving_bones(self.time)):
+                    self._animations or (
+                        self._follows and self._driven.moving_bones(self.time))):
                 self.time = end
             while self.time < end:
                 change = self._pushes.next_change(self.time) if self._pushes else None
                 until = end if change is None else min(end, change)
                 if self._follows:
                     until = min(until, self._driven.next_change(self.time, end))
+                if self._animations:
+                    until = min(until, self._animations.next_change(self.time, end))
                 self._advance_until(until)
             substates.append(self.state)
         self.substates = tuple(substates)
@@ -466,8 +494,9 @@ class Simulation:
     def place(self, coordinates: GeneralizedState) -> State:
         """Set pose and velocities of all dolls, for now and for later resets, and reset().
 
-        Collision is disabled between bones of a doll that overlap there by more than
-        allowed_penetration(); a doll that is deeper in the ground is lifted onto it. Raises
+        Animations do not begin any more. Collision is disabled between bones of a doll that overlap
+        there by more than allowed_penetration(); a doll that is deeper in the ground is lifted onto
+        it. Raises
         OutOfRange for lengths other than the scene's, NotFinite, NotUnit for orientations.
 
         >>> simulation.place(simulation.coordinates) is simulation.state
@@ -479,7 +508,9 @@ class Simulation:
             raise errors.OutOfRange('coordinates', (q.shape, v.shape), f'{layout.sizes} numbers')
         errors.check_finite('coordinates', (*q.tolist(), *v.tolist()))
         layout.check_orientations(q)
-        self._placed, self._overlaps = GeneralizedState(q, v), None
+        self._placed, self._overlaps, self._plays = GeneralizedState(q, v), None, False
+        for doll in self._animations.dolls:
+            self._engine.set_kinematic(doll, False)
         self._engine.set_coordinates(self._placed)
         self._engine.discard(self._start)
         self._start = self._engine.save()
@@ -491,7 +522,7 @@ class Simulation:
                   joint_angles: Mapping[str, float] | None = None,
                   joint_rates: Mapping[str, float] | None = None) -> State:
         """Set pose and velocities of a doll's root, joint angles and rates from now on; what is not
-        given stays.
+        given stays. An animated doll goes limp.
 
         Simulated time continues, and other dolls go on as before. The change of energy counts as
         work of pushes. A doll that would be deep in the ground is lifted onto it. Its bones that
@@ -516,6 +547,7 @@ class Simulation:
         [0.0, 0.0, 2.0]
         """
         index, layout = self._doll_index(doll), self._engine.layout
+        self._release([index], 'set_state')
         here = self._engine.coordinates
         for values, own, name, given, checked in (
                 (here.q, layout.root_positions, 'position', position, checked_point),
@@ -610,7 +642,7 @@ class Simulation:
 
     def checkpoint(self) -> tuple[int, object]:
         """Save time and state for go_back(); cheap enough for every tick."""
-        return self.time, self._engine.checkpoint()
+        return self.time, (self._engine.checkpoint(), self._animations.save())
 
     def go_back(self, checkpoint: tuple[int, object]) -> State:
         """Restore a checkpoint; pushes and hands are kept, swings start at rest.
@@ -618,7 +650,7 @@ class Simulation:
         A new engine is made, as a diverged state may have damaged the old one: a NaN stays in
         PyBullet's broad phase.
         """
-        self.time, engine_checkpoint = checkpoint
+        self.time, (engine_checkpoint, animated) = checkpoint
         accuracy = self.accuracy
         self._engine.close()
         self._engine = self._make_engine(accuracy)
@@ -628,6 +660,7 @@ class Simulation:
             self._engine.log_impacts(True)
         self._clear_impacts()
         self._driven.forget_twists()
+        self._animations.go_back(animated, self._engine)
         self._sleep_detector.restart()
         self.asleep = bool(self._engine.sleeping.all())
         if self._swings:
@@ -652,8 +685,11 @@ class Simulation:
         self._pushes = PushQueue(self.scene)
         self._hands, self._joint_springs = Hands(self.scene), JointSprings(self.scene)
         self._driven = DrivenBodies(self.scene, self.state)
+        self._animations = Animations(self.scene if self._plays else None, self.time)
+        self._animations.restore(self._engine)
         self._sleep_detector.restart()
         self.asleep = False
+        self._release(self._animations.due(self.time), 'limp_at')
         if self._swings:
             self._swings.reset(self.time, self.state)
         return self.state
@@ -671,7 +707,7 @@ class Simulation:
             'limit_overshoot_rad': max(0.0, float(
                 engine.layout.limit_violations(self.coordinates.q).max(initial=0.0))),
             'sinking_m': max(0.0, -float(
-                self._heights(self.state)[self._yields].min(initial=np.inf))),
+                self._heights(self.state)[self._resting].min(initial=np.inf))),
             **({'stale_bodies': len(self.stale_bodies), 'body_jumps_total': self._driven.jumps}
                if self._follows else {}),
             'asleep': self.asleep}
@@ -720,7 +756,7 @@ class Simulation:
         self._require(Capability.SCENE_CHANGES)
         change = SceneChange(self.scene, dataclasses.replace(self.scene, dolls=tuple(dolls)))
         placed = self._placed
-        if placed is not None or any(placement.angles or placement.rates for placement in dolls):
+        if placed is not None or any(placement.is_posed for placement in dolls):
             placed = changed_coordinates(placed or placed_coordinates(self.scene.dolls), change)
         engine = self._engine.with_dolls(change.after)
         if placed is not None:
@@ -734,6 +770,8 @@ class Simulation:
         self.asleep, self.substates = bool(self._engine.sleeping.all()), (self.state,)
         self._pushes.change_scene(change)
         self._driven.change_scene(change, self.state)
+        self._animations.change_scene(change, self.time)
+        self._animations.restore(self._engine)
         self._hands.change_scene(change)
         self._joint_springs = self._joint_springs.changed(change)
         detector, self._sleep_detector = self._sleep_detector, prepared.sleep_detector
@@ -759,6 +797,12 @@ class Simulation:
         if self._pushes:
             loads = (self._pushes.wrenches(self.time, self.state), loads[1],
                      [*loads[2], *self._pushes.drives(self.time)])
+        if self._animations:
+            self._release(self._animations.pushed(loads, self.state, self.scene.doll_of_bone),
+                          'limp_above')
+        if self._animations:
+            self._animations.begin_interval(self._engine, self.time, end)
+            self.asleep = False
         if any(loads):
             self.asleep = False
         if not self.asleep:
@@ -768,6 +812,19 @@ class Simulation:
                 self._impact_recorder.add(self._engine.impacts, self.time)
             self._hands.move(duration)
         self.time = end
+        if self._animations:
+            self._animations.end_interval(self._engine, end)
+            self._release(self._animations.due(end), 'limp_at')
+
+    def _release(self, dolls: Sequence[int], reason: str) -> None:
+        """Let those of ``dolls`` go limp that are animated."""
+        animated = [doll for doll in dolls if doll in self._animations.dolls]
+        if animated:
+            self._animations.release(self._engine, animated, self.time)
+            self._went_limp([self.scene.dolls[doll].name for doll in animated], reason)
+
+    def _went_limp(self, dolls: Sequence[str], reason: str) -> None:
+        """Called after dolls have gone limp, for LoggedSimulation."""
 
     def _clear_impacts(self) -> None:
         """Forget the impacts of the last tick."""
@@ -787,7 +844,8 @@ class Simulation:
         if self.asleep or not self.accuracy.sleep or detector.all_move(self._engine):
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs),
-                  *(self._driven.moving_bones(self.time) if self._follows else ()))
+                  *(self._driven.moving_bones(self.time) if self._follows else ()),
+                  *(self.scene.bone_slices[doll].start for doll in self._animations.dolls))
         dolls = detector.find_ready(self._engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs
             return
@@ -819,6 +877,13 @@ class Simulation:
         """(n,) bones that are not of bodies that follow exactly."""
         kinematic = np.array([placement.is_kinematic for placement in self.scene.dolls])
         return ~kinematic[self.scene.doll_of_bone]
+
+    @property
+    def _resting(self) -> np.ndarray:
+        """(n,) bones that the ground bears: neither bodies that follow exactly nor animated."""
+        if not self._animations:
+            return self._yields
+        return self._yields & ~np.isin(self.scene.doll_of_bone, self._animations.dolls)
 
     @cached_property
     def _gap(self) -> JointGap:

@@ -8,7 +8,7 @@ from ..physics.logged_simulation import accuracy_from, apply_event, state_digest
 from ..physics.simulation import Simulation
 from .run import Event, ReplayedRun
 
-PASSIVE_KINDS = ('pause', 'parameters')
+PASSIVE_KINDS = ('pause', 'parameters', 'limp')
 """Kinds of events that do not act on the simulation."""
 
 

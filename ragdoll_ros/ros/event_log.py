@@ -12,6 +12,8 @@ shows; ``tick`` is the number of ticks made before it; the other fields depend o
 - add: likewise; ``placement`` is YAML, as a scene of the doll alone
 - state: ``sha256`` of the state, every HASH_INTERVAL ticks, while there is a subscriber
 - unload: the end of the world; no ticks are made until the next start
+- go_limp: likewise; limp: which dolls went limp from their animations at which time, s, and why;
+  for information
 - pause, parameters: for information; their effects on the simulation are events of their own
 
 Floats are written so that they are read back to the same bits.

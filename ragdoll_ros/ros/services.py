@@ -1,4 +1,4 @@
-"""The services ~/reset, ~/step and ~/pause."""
+"""The services ~/reset, ~/step, ~/pause and ~/go_limp."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -33,13 +33,14 @@ class Controlled(Protocol):
 
 
 class Services:
-    """Servers of ~/reset, ~/step and ~/pause on ``node``; ``controlled`` is the same node."""
+    """Servers of these services on ``node``; ``controlled`` is the same node."""
 
     def __init__(self, node: Node, controlled: Controlled) -> None:
         self._controlled = controlled
         for kind, name, serve in ((Trigger, '~/reset', self._reset),
                                   (Trigger, '~/step', self._step),
-                                  (SetBool, '~/pause', self._pause)):
+                                  (SetBool, '~/pause', self._pause),
+                                  (Trigger, '~/go_limp', self._go_limp)):
             node.create_service(kind, name, partial(self._serve, name, serve))
 
     def _serve(self, name: str, serve: Callable, request: object, response: object) -> object:
@@ -66,6 +67,16 @@ class Services:
         self._controlled.pause(request.data)
         word = 'paused' if request.data else 'running'
         return _respond(response, True, f'{word} at {self._time():.9g} s')
+
+    def _go_limp(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Let all animated dolls go limp; refused if there is none."""
+        simulation = self._controlled.simulation
+        dolls = simulation.animated
+        if not dolls:
+            self._controlled.input_counts.refuse('~/go_limp', 'no animated doll')
+            return _respond(response, False, 'no doll is moved by an animation')
+        simulation.go_limp()
+        return _respond(response, True, f'{", ".join(dolls)} limp at {self._time():.9g} s')
 
     def _time(self) -> float:
         return self._controlled.simulation.time / SECOND

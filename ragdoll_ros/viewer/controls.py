@@ -8,6 +8,7 @@ import viser
 
 from ..files.config import scene_names
 from ..model.errors import RagdollError
+from ..model.scene import Scene
 from ..physics.engine.registry import ENGINES
 from .pushing.ball import BallThrower
 from .pushing.push_keys import PushKeys
@@ -36,6 +37,10 @@ class Controls:
         gui, is_simulated = server.gui, source.recording is None
         self.pushes = PushKeys(server, source)
         self.ball = BallThrower(server, source)
+        self.go_limp = gui.add_button(
+            'Go limp', visible=False, hint='End the animation: the doll falls, from its pose and '
+            'with its velocities')
+        self.go_limp.on_click(lambda _: source.go_limp())
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
         self.first_scenes = gui.add_button_group(
@@ -53,6 +58,11 @@ class Controls:
         if status.engine != self._shown_engine:
             self._shown_engine = status.engine
             self._show_engine(status.engine)
+
+    def show_animated(self, scene: Scene) -> None:
+        """Show the button that ends animations, if the scene has any."""
+        self.go_limp.visible = self.source.recording is None and any(
+            placement.animation for placement in scene.dolls)
 
     def show_scene(self, name: str) -> None:
         """Show the name of the scene.

@@ -216,6 +216,7 @@ class Page:
             self.stage = Stage(self.server, frame)
             self._pointer.attach(self.stage.bodies, self.stage.skins)
             self.controls.show_scene(frame.scene.name)
+            self.controls.show_animated(frame.scene)
             self.controls.pushes.show_scene(frame.scene)
             self.display.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)

@@ -15,6 +15,7 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...model import errors, rotation
 from .accessors import read_floats
@@ -50,65 +51,83 @@ class NodeTrack:
     interpolation: str
     is_rotation: bool
 
-    def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Value (w,) and its derivative per s; a rotation's value is a unit quaternion."""
-        after = int(np.searchsorted(self.times, time))
-        near = min(max(after - 1, 0), len(self.times) - 1)
-        key = min((near, min(after, len(self.times) - 1)),
-                  key=lambda index: abs(self.times[index] - time))
-        if abs(self.times[key] - time) > KEY_TOLERANCE:
-            if 0 < after < len(self.times):
-                return self._between(after - 1, time)
-            return self._unit(self.values[key, 1], np.zeros(self.values.shape[2]))
-        sides = [self._between(first, float(self.times[key])) for first in (key - 1, key)
-                 if 0 <= first < len(self.times) - 1]
-        if not sides:
-            return self._unit(self.values[key, 1], np.zeros(self.values.shape[2]))
-        # A slerp may end in the negative of the quaternion at which the next one begins.
-        value = sides[-1][0]
-        signs = [-1.0 if self.is_rotation and value @ side < 0 else 1.0 for side, _ in sides]
-        rates = [sign * rate for sign, (_, rate) in zip(signs, sides, strict=True)]
-        return value, np.mean(rates, axis=0)
+    def at(self, times: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Values (..., w) at ``times`` (...) s, and their derivatives per s; a rotation's values
+        are unit quaternions.
+        """
+        value, rate = self._at(np.ravel(times).astype(float))
+        shape = (*np.shape(times), value.shape[1])
+        return value.reshape(shape), rate.reshape(shape)
 
-    def _between(self, first: int, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Value and derivative within the interval after the key ``first``, its ends included."""
-        length = float(self.times[first + 1] - self.times[first])
-        share = (time - float(self.times[first])) / length
-        (_, begin, leave), (arrive, end, _) = self.values[first], self.values[first + 1]
+    def _at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (t, w) at ``times`` (t,), and their derivatives."""
+        last = len(self.times) - 1
+        after = np.searchsorted(self.times, times).clip(0, last)
+        before = np.maximum(after - 1, 0)
+        key = np.where(np.abs(self.times[before] - times) < np.abs(self.times[after] - times),
+                       before, after)
+        near = np.abs(self.times[key] - times) <= KEY_TOLERANCE
+        times = np.where(near, self.times[key], times)
+        outside = (times < self.times[0]) | (times > self.times[-1])
+        times = times.clip(self.times[0], self.times[-1])
+        if last == 0:
+            return self._unit(self.values[key, 1], np.zeros_like(self.values[key, 1]))
+        value, rate = self._between(
+            (np.searchsorted(self.times, times, side='right') - 1).clip(0, last - 1), times)
+        other, change = self._between(
+            (np.searchsorted(self.times, times) - 1).clip(0, last - 1), times)
+        if self.is_rotation:
+            # A slerp may end in the negative of the quaternion at which the next one begins.
+            change = change * np.where(np.sum(value * other, axis=1) < 0, -1.0, 1.0)[:, None]
+        return value, np.where(outside[:, None], 0.0, (rate + change) / 2)
+
+    def _between(self, first: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values and derivatives within the intervals after the keys ``first`` (t,), their ends
+        included.
+        """
+        length = (self.times[first + 1] - self.times[first])[:, None]
+        share = (times - self.times[first])[:, None] / length
+        begin, leave = self.values[first, 1], self.values[first, 2]
+        arrive, end = self.values[first + 1, 0], self.values[first + 1, 1]
         if self.interpolation == 'STEP':
-            return self._unit(end if share >= 1 else begin, np.zeros_like(begin))
+            return self._unit(np.where(share >= 1, end, begin), np.zeros_like(begin))
         if self.interpolation == 'CUBICSPLINE':
-            powers = np.array((1.0, share, share ** 2, share ** 3))
-            slopes = np.array((0.0, 1.0, 2 * share, 3 * share ** 2)) / length
-            points = np.stack([begin, length * leave, end, length * arrive])
-            return self._unit(powers @ HERMITE @ points, slopes @ HERMITE @ points)
+            powers = np.concatenate([np.ones_like(share), share, share ** 2, share ** 3], axis=1)
+            slopes = np.concatenate([np.zeros_like(share), np.ones_like(share), 2 * share,
+                                     3 * share ** 2], axis=1) / length
+            points = HERMITE @ np.stack([begin, length * leave, end, length * arrive], axis=1)
+            return self._unit(*(np.einsum('ti,tiw->tw', each, points)
+                                for each in (powers, slopes)))
         if self.is_rotation:
             return _slerp(begin, end, share, length)
         return begin + share * (end - begin), (end - begin) / length
 
-    def _unit(self, value: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A rotation's value as a unit quaternion, with its derivative; others as they are."""
+    def _unit(self, values: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rotations' values as unit quaternions, with their derivatives; others as they are."""
         if not self.is_rotation:
-            return value, rate
-        norm = np.linalg.norm(value)
-        if norm < 1e-9:
-            return np.array(rotation.IDENTITY), np.zeros(4)
-        value = value / norm
-        return value, (rate - value * (value @ rate)) / norm
+            return values, rates
+        norms = np.linalg.norm(values, axis=1, keepdims=True)
+        small = norms < 1e-9
+        unit = np.where(small, rotation.IDENTITY, values / np.where(small, 1.0, norms))
+        along = np.sum(unit * rates, axis=1, keepdims=True)
+        return unit, np.where(small, 0.0, (rates - unit * along) / np.where(small, 1.0, norms))
 
 
 HERMITE = np.array(((1.0, 0, 0, 0), (0, 1, 0, 0), (-3, -2, 3, -1), (2, 1, -2, 1)))
 """Coefficients of 1, s, s^2, s^3 of a cubic: of its value and slope at 0, and at 1."""
 
 
-def _slerp(begin: np.ndarray, end: np.ndarray, share: float,
-           length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Quaternion on the shorter arc, at constant speed, and its derivative."""
+def _slerp(begin: np.ndarray, end: np.ndarray, share: np.ndarray,
+           length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quaternions (t, 4) on the shorter arcs, at constant speed, and their derivatives; ``share``
+    and ``length`` (t, 1).
+    """
     begin = rotation.normalized(begin)
     arc = rotation.rotation_vector(rotation.multiply(
         rotation.inverse(begin), rotation.normalized(end)))
     value = rotation.multiply(begin, rotation.from_rotation_vector(share * arc))
-    return value, rotation.multiply(value, np.append(arc / (2 * length), 0.0))
+    return value, rotation.multiply(value, np.append(arc / (2 * length), np.zeros_like(length),
+                                                     axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,30 +150,33 @@ class NodeAnimation:
         """s, from 0 to its last key."""
         return max(float(track.times[-1]) for track in self.tracks.values())
 
-    def worlds(self, nodes: Nodes, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Global transforms (n, 4, 4) of all nodes at ``time``, and their derivatives per s."""
+    def worlds(self, nodes: Nodes, times: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Global transforms (n, ..., 4, 4) of all nodes at ``times`` (...), and their derivatives
+        per s.
+        """
         moved = {node for node, _ in self.tracks}
-        worlds, rates = np.zeros((2, len(nodes.order), 4, 4))
+        worlds, rates = np.zeros((2, len(nodes.order), *np.shape(times), 4, 4))
         for node in nodes.order:
-            local, rate = (self._local(node, time) if node in moved
+            local, rate = (self._local(node, times) if node in moved
                            else (nodes.locals[node], np.zeros((4, 4))))
             up = nodes.parents[node]
             worlds[node], rates[node] = (local, rate) if up < 0 else (
                 worlds[up] @ local, rates[up] @ local + worlds[up] @ rate)
         return worlds, rates
 
-    def _local(self, node: int, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Local transform of a node and its derivative."""
+    def _local(self, node: int, times: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Local transforms (..., 4, 4) of a node and their derivatives."""
         parts = local_parts(self.file.json['nodes'][node], f'nodes[{node}]')
-        found = {key: self.tracks[node, key].at(time) if (node, key) in self.tracks
+        found = {key: self.tracks[node, key].at(times) if (node, key) in self.tracks
                  else (value, np.zeros_like(value)) for key, value in parts.items()}
         (move, moves), (q, changes), (scale, grows) = (found[key] for key in PROPERTIES)
         turn = rotation.matrix(q)
         # A rotation matrix is quadratic in the quaternion.
         turns = (rotation.matrix(q + changes) - rotation.matrix(q - changes)) / 2
-        local, rate = np.eye(4), np.zeros((4, 4))
-        local[:3, :3], local[:3, 3] = turn * scale, move
-        rate[:3, :3], rate[:3, 3] = turns * scale + turn * grows, moves
+        local, rate = np.zeros((2, *np.shape(times), 4, 4))
+        scale, grows = scale[..., None, :], grows[..., None, :]
+        local[..., :3, :3], local[..., :3, 3], local[..., 3, 3] = turn * scale, move, 1.0
+        rate[..., :3, :3], rate[..., :3, 3] = turns * scale + turn * grows, moves
         return local, rate
 
 

@@ -264,6 +264,19 @@ class Engine(Protocol):
         DRIVEN_BODIES.
         """
 
+    def set_kinematic(self, doll: int, kinematic: bool) -> None:
+        """Let a doll move at its velocities, whatever acts on it, or no more. What is kinematic has
+        no contact with itself and the ground, and its energy counts as zero. Of an animated doll;
+        its bones that overlap when it ends do not collide until they separate. An engine that has
+        no kinematic dolls does nothing: set_motion() is all that moves one.
+        """
+
+    def set_motion(self, dolls: Sequence[int], coordinates: GeneralizedState) -> None:
+        """Set the coordinates and velocities of kinematic ``dolls`` to their own in
+        ``coordinates``, wherever they are then; their contacts are kept. The change of energy
+        counts as work of pushes.
+        """
+
     def with_dolls(self, scene: Scene) -> Engine:
         """A new engine at the start of ``scene``, which differs from this one's in its dolls alone;
         it shares what depends on a doll and not on its state. SCENE_CHANGES.

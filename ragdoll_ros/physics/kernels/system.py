@@ -54,9 +54,9 @@ root; ``body_doll`` (n,). ``geoms``, static ones last; ``pairs`` (of geoms that 
 ``energy_scale`` (1,) J: m g L of the whole system, L the largest reach. ``flight_enabled`` (1,):
 whether joint damping allows explicit integration."""
 
-OVERLAPPING, JOINT_OUTSIDE_LIMITS = 1, 2
+OVERLAPPING, JOINT_OUTSIDE_LIMITS, KINEMATIC = 1, 2, 4
 """Flags, why a pair is excluded from collision for now: its geoms overlap, as they did at the
-start; a joint between its bodies is outside its limits."""
+start; a joint between its bodies is outside its limits; its bodies are of a kinematic doll."""
 
 COMPLIANCE, IMPACT_COMPLIANCE = 1e-8, 1e-10
 """Compliance of contacts and limits, as a share of the diagonal of W = J H^-1 J^T, in steps and at

@@ -150,6 +150,9 @@ class Source(Protocol):
     def reset(self) -> None:
         """Go back to the start."""
 
+    def go_limp(self) -> None:
+        """Let all dolls go limp that an animation moves."""
+
     def set_real_time_factor(self, factor: float) -> None:
         """Set the simulated time per wall time."""
 

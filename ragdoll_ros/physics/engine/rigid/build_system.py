@@ -44,7 +44,7 @@ def build_system(scene: Scene) -> System:
         ground_offset=np.array([ground.offset if ground else -math.inf]),
         restitution_speed=np.array([scene.material.restitution_speed]),
         doll_masses=np.array([placement.doll.mass for placement in scene.dolls]),
-        energy_scale=_energy_scale(tree, geoms, scene.gravity),
+        energy_scale=energy_scale(tree, geoms, scene.gravity),
         flight_enabled=np.array([float(damping_rate(scene) < MAX_FLIGHT_DAMPING)]))
 
 
@@ -91,7 +91,7 @@ def _enter_joint(body: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, in
             body['passive_rates'][axis, index] = 1 / end.width
 
 
-def _energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) -> np.ndarray:
+def energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) -> np.ndarray:
     """Energy scale m g L (1,), J: m of all bodies, L the largest reach of a geom; of those that
     gravity moves.
     """
@@ -129,10 +129,10 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray,
     whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in (
         'tree', 'dof_parent', 'dof_body', 'dof_damping', 'body_last_dof', 'body_root', 'body_doll',
         'geoms', 'joint_limits', 'doll_masses')}
-    energy_scale = _energy_scale(whole['tree'], whole['geoms'], parts[0].gravity)
+    scale = energy_scale(whole['tree'], whole['geoms'], parts[0].gravity)
     whole['geoms'] = np.concatenate([whole['geoms'], static_geoms])
     return parts[0]._replace(
-        **whole, energy_scale=energy_scale,
+        **whole, energy_scale=scale,
         pairs=np.concatenate([*(part.pairs for part in parts), pairs]),
         flight_enabled=np.array([min(part.flight_enabled[0] for part in parts)]))
 

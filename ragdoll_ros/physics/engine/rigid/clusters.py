@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -16,12 +16,13 @@ from ...accuracy import Accuracy
 from ...kernels.cluster_state import IMPACT, LEDGER, STEP_STATS, ClusterState, make_cluster_state
 from ...kernels.compiling.bundle import bind
 from ...kernels.contact_kind import LIMIT
+from ...kernels.dynamics.body import WORLD
 from ...kernels.loaded import advance as kernels
-from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING, System
+from ...kernels.system import JOINT_OUTSIDE_LIMITS, KINEMATIC, OVERLAPPING, System
 from ...kernels.workspace import Workspace, make_workspace
 from ..protocol import GROUND, Impacts
 from .broad_phase import NO_PAIRS
-from .build_system import build_system, contact_laws, join_systems, make_pairs
+from .build_system import build_system, contact_laws, energy_scale, join_systems, make_pairs
 from .contact_points import bone_pairs, contact_points
 from .doll_states import SNAPSHOT, DollStates, contact_capacity
 from .impact_records import join_impacts, logged_impacts
@@ -97,8 +98,8 @@ class Clusters:
                  like: Clusters | None = None) -> None:
         self._scene = scene
         self._systems, self._laws = _each_doll(scene, like)
-        self._kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
-        """(d,) dolls that set_velocities() leaves as they are."""
+        self.kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
+        """(d,) dolls that move at their velocities, whatever acts on them."""
         self._q = [np.arange(own.start, own.stop) for own in layout.doll_q]
         self._v = [np.arange(own.start, own.stop) for own in layout.doll_v]
         self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
@@ -209,7 +210,7 @@ class Clusters:
         """Set the velocities of ``dolls`` (d,), whole clusters, to those in ``velocities``, but for
         those of kinematic ones.
         """
-        own = (dolls & ~self._kinematic)[self._doll_of_v]
+        own = (dolls & ~self.kinematic)[self._doll_of_v]
         self.v[own] = velocities[own]
         self._states.arrays['dense_step'][dolls] = 0
         for cluster in self._joined:
@@ -225,6 +226,36 @@ class Clusters:
         cluster = self.members[self.of_doll[doll]]
         cluster.state.v[:] = self.v[cluster.v_indices]
         cluster.state.dense_step[:] = 0
+
+    def set_motion(self, dolls: Sequence[int], q: np.ndarray, v: np.ndarray) -> None:
+        """Set the coordinates and velocities of kinematic dolls to their own in those of the scene
+        (nq,), (nv,); the contacts of their clusters are kept.
+        """
+        for doll in dolls:
+            self.q[self._q[doll]], self.v[self._v[doll]] = q[self._q[doll]], v[self._v[doll]]
+            cluster = self.members[self.of_doll[doll]]
+            cluster.state.q[:] = self.q[cluster.q_indices]
+            cluster.state.v[:] = self.v[cluster.v_indices]
+            cluster.state.dense_step[:] = 0
+            cluster.state.stats['gaps_current'] = 0
+
+    def set_kinematic(self, doll: int, kinematic: bool) -> None:
+        """Let a doll move at its velocities, whatever acts on it, or no more. It has no contacts
+        with itself, its limits and the ground while it does; what overlaps of it then does not
+        collide until it separates.
+        """
+        self.kinematic[doll] = kinematic
+        cluster, single = self.members[self.of_doll[doll]], self._singles[doll]
+        for one in {id(each): each for each in (single, cluster)}.values():
+            system, place = one.system, int(np.searchsorted(one.dolls, doll))
+            system.tree['kinematic'][system.body_doll == place] = kinematic
+            own = system.geoms[system.geoms['body'] != WORLD]
+            if not system.tree['kinematic'].all():
+                system.energy_scale[:] = energy_scale(system.tree, own, system.gravity)
+            excluded = self._own_excluded(one, doll)
+            excluded[:] = excluded | KINEMATIC if kinematic else (
+                excluded & ~KINEMATIC | OVERLAPPING | JOINT_OUTSIDE_LIMITS)
+            _invalidate(one)
 
     def follow_twist(self, doll: int) -> None:
         """Mark that the twist of a doll was set: its contacts take the new one."""
@@ -252,19 +283,22 @@ class Clusters:
 
     def exclude(self, flags: list[np.ndarray]) -> None:
         """Set the exclusion flags (p,) of each doll's pairs of geoms; see kernels/system.py."""
-        for cluster, own in zip(self._singles, flags, strict=True):
-            cluster.state.excluded[:] = own
+        for cluster, own, kinematic in zip(self._singles, flags, self.kinematic, strict=True):
+            cluster.state.excluded[:] = own | KINEMATIC * kinematic
 
     def exclude_overlaps(self, doll: int) -> None:
         """Exclude those pairs of geoms of a doll that overlap in its next state, until they
         separate, and those that only a joint outside its limits brings together.
         """
-        cluster, single = self.members[self.of_doll[doll]], self._singles[doll]
+        for one in (self._singles[doll], self.members[self.of_doll[doll]]):
+            excluded = self._own_excluded(one, doll)
+            excluded |= OVERLAPPING | JOINT_OUTSIDE_LIMITS
+
+    def _own_excluded(self, cluster: Cluster, doll: int) -> np.ndarray:
+        """View of the exclusion flags (p,) of a doll's pairs in the state of its cluster."""
         before = sum(len(self._singles[other].state.excluded)
                      for other in itertools.takewhile(lambda other: other != doll, cluster.dolls))
-        for state, at in ((single.state, 0), (cluster.state, before)):
-            state.excluded[at:at + len(single.state.excluded)] |= (
-                OVERLAPPING | JOINT_OUTSIDE_LIMITS)
+        return cluster.state.excluded[before:before + len(self._singles[doll].state.excluded)]
 
     def excluded(self, kind: int) -> list[np.ndarray]:
         """Flags (p,) of each doll's pairs: of ``kind``, OVERLAPPING or JOINT_OUTSIDE_LIMITS."""
@@ -692,7 +726,7 @@ def _each_doll(scene: Scene, like: Clusters | None) -> tuple[list[System], list[
     """The system of each doll by itself, and the contact laws of its geoms; equal dolls share
     theirs, also with those of ``like``, whose scene differs in its dolls alone.
     """
-    made: dict[tuple[int, bool], tuple[System, np.ndarray]] = {}
+    made: dict[tuple[object, ...], tuple[System, np.ndarray]] = {}
     if like is not None:
         made = dict(zip(_keys(like._scene), zip(like._systems, like._laws, strict=True),
                         strict=True))
@@ -705,9 +739,12 @@ def _each_doll(scene: Scene, like: Clusters | None) -> tuple[list[System], list[
     return [system for system, _ in each], [laws for _, laws in each]
 
 
-def _keys(scene: Scene) -> list[tuple[int, bool]]:
-    """What determines the system of each doll in a scene."""
-    return [(id(placement.doll), placement.is_kinematic) for placement in scene.dolls]
+def _keys(scene: Scene) -> list[tuple[object, ...]]:
+    """What determines the system of each doll in a scene. An animated one's changes when it goes
+    limp: no other doll has the same, nor has the same doll in another scene.
+    """
+    return [(id(placement.doll), placement.is_kinematic) if placement.animation is None
+            else (id(placement.doll), placement.name, id(scene)) for placement in scene.dolls]
 
 
 def _known_contacts(cluster: Cluster) -> np.ndarray:

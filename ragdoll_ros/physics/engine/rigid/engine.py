@@ -5,7 +5,7 @@ The algorithm of a tick is in kernels/advance.py.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Sequence
 
 import numpy as np
 
@@ -64,8 +64,9 @@ class RigidEngine:
         self._broad_phase = BroadPhase(scene, self._clusters.reach())
         self._heights = GroundHeights(scene)
         self._spins = self.layout.root_angular_velocities
-        self._kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
-        """(d,)"""
+        for doll, placement in enumerate(scene.dolls):
+            if placement.animation is not None:
+                self._clusters.set_kinematic(doll, True)
         self._some_kinematic = bool(self._kinematic.any())
         self._twisted: list[int] = []
         """Dolls whose twist has been set since the last interval."""
@@ -78,6 +79,11 @@ class RigidEngine:
         """Pairs that overlap at the start: they are excluded until they separate."""
         self.set_coordinates(placed_coordinates(scene.dolls, self.layout))
         self._initial_overlaps = self._clusters.excluded(OVERLAPPING)
+
+    @property
+    def _kinematic(self) -> np.ndarray:
+        """(d,) dolls that move at their velocities, whatever acts on them."""
+        return self._clusters.kinematic
 
     @property
     def state(self) -> State:
@@ -146,6 +152,22 @@ class RigidEngine:
         self._clusters.advance(0.0, self.accuracy, ~own)
         self._update_state()
         self._twisted.append(doll)
+
+    def set_motion(self, dolls: Sequence[int], coordinates: GeneralizedState) -> None:
+        own = np.isin(self.cluster_of_doll, self.cluster_of_doll[dolls])
+        self._wake(own)
+        self._clusters.set_motion(dolls, coordinates.q, self._in_root_axes(coordinates))
+        self._clusters.advance(0.0, self.accuracy, ~own)
+        self._update_state()
+        self._twisted += dolls
+
+    def set_kinematic(self, doll: int, kinematic: bool) -> None:
+        own = self.cluster_of_doll == self.cluster_of_doll[doll]
+        self._wake(own)
+        self._clusters.set_kinematic(doll, kinematic)
+        self._some_kinematic = bool(self._kinematic.any())
+        self._age[own] = MAX_AGE
+        self._last_start = None
 
     def with_dolls(self, scene: Scene) -> RigidEngine:
         return RigidEngine(scene, self.accuracy, workers=self._clusters.workers, like=self)

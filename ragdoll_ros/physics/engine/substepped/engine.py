@@ -108,6 +108,21 @@ class SubsteppedEngine(ABC):
             self._exclude_overlaps()
         self._account.add_work(doll, self.doll_totals.energy.sum() - before, by_hand=False)
 
+    def set_kinematic(self, doll: int, kinematic: bool) -> None:
+        """Nothing: within a tick an animated doll yields to what it meets."""
+        if not kinematic:
+            self._exclude_overlaps()
+
+    def set_motion(self, dolls: Sequence[int], coordinates: GeneralizedState) -> None:
+        before, here, layout = self.doll_totals.energy.sum(), self.coordinates, self.layout
+        q, v = here.q.copy(), here.v.copy()
+        for doll in dolls:
+            q[layout.doll_q[doll]] = coordinates.q[layout.doll_q[doll]]
+            v[layout.doll_v[doll]] = coordinates.v[layout.doll_v[doll]]
+        self.sleeping[:] = False
+        self._set_state(GeneralizedState(q, v))
+        self._account.add_work(dolls[0], self.doll_totals.energy.sum() - before, by_hand=False)
+
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
         self.sleeping[:] = False

@@ -60,7 +60,8 @@ NONE = -1
 """First point of a pair whose points have no gaps of their own, and index of such a point."""
 
 EXCLUDED = 1e6
-"""m: the gap of a pair that does not collide."""
+"""m or rad: the gap of what does not collide: an excluded pair, a kinematic doll with the ground,
+its joints with their limits."""
 
 
 @compiled
@@ -83,13 +84,18 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     n, narrow_phases = 0, 0
     for k in range(len(s.geoms)):
-        if s.geoms[k].point_count and s.ground_offset[0] > -math.inf:
+        if s.geoms[k].point_count and s.tree[s.geoms[k].body].kinematic:
+            for j in range(s.geoms[k].point_count):
+                out[n + j] = EXCLUDED
+        elif s.geoms[k].point_count and s.ground_offset[0] > -math.inf:
             ground_gaps(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k],
                         vec(s.ground_normal), s.ground_offset[0], s.geoms[k].first_point, out)
         n += s.geoms[k].point_count
     for k in range(len(s.joint_limits)):
         limit = s.joint_limits[k]
         out[n], out[n + 1] = q[limit.q] - limit.lower, limit.upper - q[limit.q]
+        if s.tree[s.dof_body[limit.dof]].kinematic:
+            out[n] = out[n + 1] = EXCLUDED
         n += 2
     motion, tracks = ws.contacts.motion, ws.step.scalars[0].tracks_points != 0
     if len(s.pairs):

@@ -19,10 +19,8 @@ a quaternion (roots, and ball joints without limits). dof_count: degrees of free
 inertia: principal moments about the center of mass, kg m^2; inertial_orientation: principal axes
 relative to the doll's axes (x, y, z, w). parent_to_joint, joint_to_com: from the parent's center of
 mass to the joint and on to the body's own, m; joint_axes: rows; all three along the doll's axes in
-the bind pose. joint_damping: N m s/rad. kinematic: 1 if it is a doll by itself that moves at
-constant velocity, whatever acts on it, as of infinite inertia (a kinematic body in Box2D).
-has_passive: whether the joint has passive torques; of each axis at the lower and the upper end
-passive_torques, N m, at passive_angles, rad, and passive_rates, 1/rad, 0 for none."""
+the bind pose. joint_damping: N m s/rad. kinematic: 1 if its doll moves at
+constant velocities, whatever acts on it, as of infinite inertia (a kinematic body in Box2D)."""
 
 WORLD = -1
 """In place of the index of a body: what never moves, the ground and static geoms."""

@@ -54,8 +54,8 @@ def forward_dynamics(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q
     for i in range(len(tree)):
         body, bias, velocity = tree[i], dyn.bias_forces[i], kin.spatial_velocities[i]
         if body.kinematic:
-            for k in range(body.v_start, body.v_start + 6):
-                out[k] = 0.0
+            for k in range(6 if body.parent < 0 else body.dof_count):
+                out[body.v_start + k] = 0.0
         elif body.parent < 0:
             for k in range(6):
                 bias[k] = -bias[k]

@@ -55,7 +55,7 @@ def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.
         body = s.tree[i]
         if body.kinematic:
             out[s.body_doll[i]].energy = out[s.body_doll[i]].kinetic = 0.0
-        for k in range(body.dof_count if body.has_passive else 0):
+        for k in range(body.dof_count if body.has_passive and not body.kinematic else 0):
             out[s.body_doll[i]].energy += passive_torque(body, k, q[body.q_start + k])[2]
 
 

@@ -64,7 +64,8 @@ def account_kinematic_work(s: System, ws: Workspace, kin: Kinematics, q: np.ndar
             i, sign = (c.body_a, -1.0) if side == 0 else (c.body_b, 1.0)
             if not s.tree[i].kinematic:
                 continue
-            root, turn = root_position(q, s.tree[i].q_start), vec(kin.spatial_velocities[i])
+            root = root_position(q, s.tree[s.body_root[i]].q_start)
+            turn = vec(kin.spatial_velocities[i])
             at_friction = velocity_at(kin, i, sub(vec(c.friction_point), root))
             work = (p[0] * dot(vec(c.normal), velocity_at(kin, i, sub(vec(c.point), root)))
                     + p[1] * dot(t, at_friction) + p[2] * dot(w, at_friction))

@@ -29,11 +29,11 @@ class NodeServices:
         self._get = node.create_client(GetParameters, f'{name}/get_parameters')
         self._set = node.create_client(SetParametersAtomically, f'{name}/set_parameters_atomically')
         self._triggers = {service: node.create_client(Trigger, f'{name}/{service}')
-                          for service in ('reset', 'step')}
+                          for service in ('reset', 'step', 'go_limp')}
         self._pause = node.create_client(SetBool, f'{name}/pause')
 
     def trigger(self, service: str) -> None:
-        """Call ``reset`` or ``step``."""
+        """Call ``reset``, ``step`` or ``go_limp``."""
         self._send(self._triggers[service], Trigger.Request())
 
     def pause(self, paused: bool) -> bool:

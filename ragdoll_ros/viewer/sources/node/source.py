@@ -139,6 +139,9 @@ class NodeSource(Source):
     def reset(self) -> None:
         self._services.trigger('reset')
 
+    def go_limp(self) -> None:
+        self._services.trigger('go_limp')
+
     def set_real_time_factor(self, factor: float) -> None:
         self._services.set_parameter('real_time_factor', float(factor))
 
