@@ -640,17 +640,17 @@ class Simulation:
         self._carry_over(prepared)
         return self.state
 
-    def checkpoint(self) -> tuple[int, object]:
+    def checkpoint(self) -> tuple[int, object, object]:
         """Save time and state for go_back(); cheap enough for every tick."""
-        return self.time, (self._engine.checkpoint(), self._animations.save())
+        return self.time, self._engine.checkpoint(), self._animations.save()
 
-    def go_back(self, checkpoint: tuple[int, object]) -> State:
+    def go_back(self, checkpoint: tuple[int, object, object]) -> State:
         """Restore a checkpoint; pushes and hands are kept, swings start at rest.
 
         A new engine is made, as a diverged state may have damaged the old one: a NaN stays in
         PyBullet's broad phase.
         """
-        self.time, (engine_checkpoint, animated) = checkpoint
+        self.time, engine_checkpoint, animated = checkpoint
         accuracy = self.accuracy
         self._engine.close()
         self._engine = self._make_engine(accuracy)
