@@ -650,7 +650,8 @@ class Simulation:
         A new engine is made, as a diverged state may have damaged the old one: a NaN stays in
         PyBullet's broad phase.
         """
-        self.time, (engine_checkpoint, animated) = checkpoint
+        self.time, (engine_checkpoint, animated) = cast(
+            tuple[int, tuple[object, object]], checkpoint)
         accuracy = self.accuracy
         self._engine.close()
         self._engine = self._make_engine(accuracy)
