@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from browser import View, chromium, serving
+from browser import chromium, opened, serving
 from conftest import ROOT
 
 from ragdoll_ros.files.doll import save_doll
@@ -33,10 +33,9 @@ def path(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def view(path):
-    with chromium() as context, serving('--port', '0', '--scene', path) as url:
-        view = View(context, url)
+    with (chromium() as context, serving('--port', '0', '--scene', path) as url,
+          opened(context, url, load_scene(path), first=True) as view):
         yield view
-        assert not view.errors
 
 
 def test_the_button_fells_who_walks_and_a_reset_lets_it_walk(view, path):

@@ -40,7 +40,7 @@ class Controls:
         self.go_limp = gui.add_button(
             'Go limp', visible=False, hint='End the animation: the doll falls, from its pose and '
             'with its velocities')
-        self.go_limp.on_click(lambda _: source.go_limp())
+        self.go_limp.on_click(self._on_go_limp)
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
         self.first_scenes = gui.add_button_group(
@@ -84,6 +84,10 @@ class Controls:
                 self.loading = ''
 
         self._try(client, load, lambda: self.show_scene(self._shown_scene))
+
+    async def _on_go_limp(self, _: viser.GuiEvent) -> None:
+        """End animations; in viser's thread, so that it comes before a later step."""
+        self.source.go_limp()
 
     async def _on_scene(self, event: viser.GuiEvent) -> None:
         """Load the chosen scene, whose name is read before the page can overwrite it."""
