@@ -120,6 +120,39 @@ def test_normals_at_an_edge_lie_between_those_of_the_faces(kind, bend):
     assert found > 100
 
 
+def test_a_face_is_stopped_by_the_corner_of_a_tetrahedron():
+    """The face of a box is 0.1 mm deep on a corner, anywhere on it: the box's center may be on
+    either side of each triangle. One triangle at least has the corner, along the face's normal.
+    """
+    rng, depth, below = np.random.default_rng(5), 1e-4, 0
+    out = np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT)
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    for _ in range(1000):
+        corners = np.zeros((4, 3))
+        corners[1:] = 0.3 * rng.normal(size=(3, 3))
+        if np.linalg.det(corners[1:]) > 0:
+            corners[[1, 2]] = corners[[2, 1]]
+        normals = np.cross(corners[faces[:3, 1]], corners[faces[:3, 2]])
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        n = rotation.normalized(rng.uniform(0.02, 1, 3) @ normals)
+        if (corners[1:] @ n).max() > -0.03:
+            continue
+        turn = rotation.shortest_arc(np.array((0.0, 0.0, 1.0)), n)
+        center = rotation.rotate(turn, np.array((*rng.uniform(-1, 1, 2) * (0.15, 0.25),
+                                                 SIZES[BOX][2] - depth)))
+        box = placed(BOX, center, turn)
+        below += (normals @ center).min() < 0
+        gaps, held = [], False
+        for triangle in geoms(corners, faces):
+            gap, count = measure(box, triangle, 0.0, out)
+            gaps.append(gap)
+            held |= any(abs(at['gap'] + depth) < 1e-9 and at['normal'] @ n > 1 - 1e-9
+                        for at in out[:count])
+        assert held
+        assert min(gaps) == pytest.approx(-depth, abs=1e-9)
+    assert below > 50
+
+
 def pair_normal(triangle):
     return triangle.rotation[:, 2]
 

@@ -89,6 +89,17 @@ def corner_direction(a: Shape, c: Vec3, corner: Vec3) -> Vec3:
 
 
 @compiled
+def is_allowed_from_a_side(d: Vec3, normal: Vec3, outward: Corners, edges: Vec3, k: int) -> bool:
+    """Whether both edges at corner k allow the direction ``d``, seen from the side of a's center or
+    from the side to which ``d`` points: a long shape on a sharp corner may have its center on one
+    side of a face, and that face's normal next to ``d`` on the other.
+    """
+    return is_allowed_at_corner(d, normal, outward, edges, k) or (
+        dot(d, normal) < 0 and is_allowed_at_corner(d, neg(normal), outward,
+                                                    seen_from_below(edges), k))
+
+
+@compiled
 def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
     """Separations of a shape from a triangle."""
     corners, c = corners_of(t), sub(a.position, t.position)
@@ -128,7 +139,7 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
         d = neg(d) if dot(d, c) < 0 else d
         found, corner = core_separation(a, corners, c, d), supporting_corner(corners, d)
         distance = max(distance, found)
-        if found > allowed and is_allowed_at_corner(d, normal, outward, edges, corner):
+        if found > allowed and is_allowed_from_a_side(d, normal, outward, edges, corner):
             allowed, axis, feature = found, d, FIRST_CORNER + corner
     return LimitedAxis(distance, allowed, axis, feature, face, normal, edges)
 
