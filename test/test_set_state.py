@@ -90,8 +90,9 @@ def test_a_ball_wakes_what_it_hits():
         torso = simulation.state.positions[1 + simulation.scene.dolls[1].doll.bones.index(
             simulation.scene.dolls[1].doll.root)]
         before, time = simulation.energy_excess, 1 / 6
-        velocity = np.array([12, 0, -0.5 / time + GRAVITY * time / 2])
-        simulation.set_state('ball', torso + np.array((-2, 0, 0.5)), velocity=velocity)
+        # From where no limb lies that it would only press to the ground.
+        velocity = np.array([0, -12, -0.5 / time + GRAVITY * time / 2])
+        simulation.set_state('ball', torso + np.array((0, 2, 0.5)), velocity=velocity)
         assert not simulation.asleep
         # Of 1 kg.
         assert simulation.work[0] == pytest.approx(
