@@ -1,6 +1,8 @@
 """Machine code of a small package is kept, found again, thrown away, and done without."""
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -253,3 +255,15 @@ def test_other_functions_are_kept_as_numba_does(tiny):
     run(tiny, USE + 'import alien\nalien.half(3.0)')
     assert [path.name.partition('-')[0] for path in (tiny.parent / 'kept').rglob('*.nbi')] == [
         'alien.half']
+
+
+def test_ctrl_c_ends_compilation_without_a_traceback(tmp_path):
+    """Of the command, as it begins to compile all kernels."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ragdoll_ros.physics.kernels'], stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, text=True, env={**os.environ, 'NUMBA_CACHE_DIR': str(tmp_path)})
+    said = process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    rest, _ = process.communicate(timeout=60)
+    assert notices.COMPILING.partition(',')[0] in said and not rest
+    assert process.returncode == -signal.SIGINT

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import time
 
@@ -35,4 +36,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == '__main__':
+    # Ctrl-C ends it at once: an exception within the compiler would be lost, or become another one.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.exit(main())
