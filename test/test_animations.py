@@ -119,6 +119,17 @@ def test_bodies_are_where_the_bones_are_and_as_fast(doll, animations, name, engi
     np.testing.assert_allclose(state.angular_velocities, spins, atol=1e-3)
 
 
+def momenta_of_poses(doll, poses, time):
+    """Momenta and energy of bodies that pass by at ``poses(time)``: by differences of order 4."""
+    h, here = 2e-3, poses(time)
+    orientations = np.array([pose.orientation for pose in here])
+    turns = rate(lambda at: [rotation.matrix(pose.orientation) for pose in poses(at)], time, h)
+    across = turns @ np.swapaxes(rotation.matrix(orientations), 1, 2)
+    return momenta(doll, np.array([pose.position for pose in here]), orientations,
+                   rate(lambda at: [pose.position for pose in poses(at)], time, h),
+                   np.stack([across[:, 2, 1], across[:, 0, 2], across[:, 1, 0]], axis=1))
+
+
 def momenta(doll, positions, orientations, velocities, spins):
     """Momentum, angular momentum about the centre of mass and kinetic energy, by the textbook."""
     masses = np.array([bone.mass for bone in doll.bones])[:, None]
@@ -133,22 +144,16 @@ def momenta(doll, positions, orientations, velocities, spins):
 @pytest.mark.parametrize('engine', ['rigid', 'bullet', 'mujoco'])
 @pytest.mark.parametrize('name', MOVES)
 def test_momentum_and_energy_are_those_of_the_animation(doll, animations, name, engine):
-    """Of the doll's bodies as they pass by: differences of order 4 of their placed poses."""
+    """Of the doll's bodies as they pass by, at their placed poses."""
     here = Placement(doll, '', (1, 2, 3), tuple(rotation.normalized((0.1, 0.2, 0.3, 0.9))))
     state = started(animations[name].place(here, TIME), engine)
-    h = 2e-3
 
     @functools.cache
     def poses(time):
         placement = animations[name].place(here, time)
         return [placement.bone_pose(bone) for bone in doll.bones]
 
-    orientations = np.array([pose.orientation for pose in poses(TIME)])
-    turns = rate(lambda time: [rotation.matrix(pose.orientation) for pose in poses(time)], TIME, h)
-    across = turns @ np.swapaxes(rotation.matrix(orientations), 1, 2)
-    due = momenta(doll, np.array([pose.position for pose in poses(TIME)]), orientations,
-                  rate(lambda time: [pose.position for pose in poses(time)], TIME, h),
-                  np.stack([across[:, 2, 1], across[:, 0, 2], across[:, 1, 0]], axis=1))
+    due = momenta_of_poses(doll, poses, TIME)
     found = momenta(doll, state.positions, state.orientations, state.linear_velocities,
                     state.angular_velocities)
     # Angles are rounded to 2e-11 rad, their differences to 1e-8 rad/s.

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-G = 9.80665
-"""Standard acceleration of gravity, m/s^2."""
+from ..physics.sensors.head_injury import STANDARD_GRAVITY
 
 EARLY = 6.0
 """g: before the impact, people's falls stay below it."""
@@ -36,8 +35,9 @@ class Peaks:
         """Of samples (s, 3) m/s^2 of each fall, ``interval`` s apart, the first at the start;
         ``impacts`` (f,) s from the start, NaN without one.
         """
-        found = np.array([_peak(np.linalg.norm(samples, axis=1) / G, impact / interval)
-                          for samples, impact in zip(falls, impacts, strict=True)]).reshape(-1, 3)
+        found = np.array([
+            _peak(np.linalg.norm(samples, axis=1) / STANDARD_GRAVITY, impact / interval)
+            for samples, impact in zip(falls, impacts, strict=True)]).reshape(-1, 3)
         return cls(sensor['name'], sensor['bone'], found[:, 0], found[:, 1] * interval, found[:, 2])
 
     @property

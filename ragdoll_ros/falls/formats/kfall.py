@@ -15,8 +15,8 @@ import numpy as np
 
 from ...model import rotation
 from ...model.errors import WrongForm
+from ...physics.sensors.head_injury import STANDARD_GRAVITY
 from ..fall import Fall, fall_samples, sensor_orientations
-from ..peaks import G
 from ..recipe import Recipe
 from .tasks import description_of, task_of
 
@@ -60,7 +60,7 @@ def _rows(recipe: Recipe, fall: Fall) -> list[list[float]]:
     samples = fall_samples(fall, 0)[:count]
     angles = [rotation.to_rpy(turn) for turn in sensor_orientations(fall, 0)[:count]]
     times = np.arange(count) / (recipe.rate * fall.samples_per_frame)
-    numbers = np.concatenate([samples[:, :3] / G, np.degrees(samples[:, 3:]),
+    numbers = np.concatenate([samples[:, :3] / STANDARD_GRAVITY, np.degrees(samples[:, 3:]),
                               np.degrees(np.array(angles).reshape(-1, 3))], axis=1)
     return [[f'{time:.6f}', place, *(f'{number:.6f}' for number in row)]
             for place, (time, row) in enumerate(zip(times, numbers.tolist(), strict=True))]

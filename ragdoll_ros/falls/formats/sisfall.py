@@ -11,8 +11,8 @@ from collections import Counter
 import numpy as np
 
 from ...model.errors import WrongForm
+from ...physics.sensors.head_injury import STANDARD_GRAVITY
 from ..fall import Fall, fall_samples
-from ..peaks import G
 from ..recipe import Recipe
 from .kfall import table, valid_samples
 from .tasks import description_of, task_of
@@ -54,7 +54,7 @@ def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, byte
 
 def _lines(fall: Fall) -> bytes:
     samples = fall_samples(fall, 0)[:valid_samples(fall)]
-    force, rate = samples[:, :3] / G, np.degrees(samples[:, 3:])
+    force, rate = samples[:, :3] / STANDARD_GRAVITY, np.degrees(samples[:, 3:])
     numbers = np.concatenate([_counts(values, *chip) for values, chip in
                               zip((force, rate, force), CHIPS, strict=True)], axis=1)
     return ''.join(','.join(map(str, row)) + ';\n' for row in numbers.tolist()).encode()
