@@ -76,7 +76,7 @@ def main(arguments: list[str] | None = None) -> int:
     stop = stop_on_signals()
     try:
         if importlib.util.find_spec('viser') is None:
-            # Checked before the kernels are compiled, which takes half a minute.
+            # Checked before the kernels are compiled, which takes a minute or two.
             raise CannotServe(NO_VISER)
         check_options(options, for_ros)
         if options.static is not None:

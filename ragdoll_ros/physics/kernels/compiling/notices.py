@@ -5,7 +5,7 @@ import sys
 
 from numba.core import event
 
-COMPILING = 'Compiling the dynamics: less than a minute, {}'
+COMPILING = 'Compiling the dynamics: a minute or two, {}'
 ONCE = 'once'
 EVERY_TIME = ('at every start, as no folder to keep the result in can be written to; the variable '
               'NUMBA_CACHE_DIR may name one')
