@@ -169,9 +169,11 @@ def test_tumbled_dolls_are_turned_evenly():
         assert stats.kstest(up[:, axis], stats.uniform(-1, 2).cdf).pvalue > 1e-3
 
 
-def test_a_dropped_ball_hits_when_and_as_fast_as_it_must():
+@pytest.mark.parametrize('restitution', [0.0, 0.8])
+def test_a_dropped_ball_hits_when_and_as_fast_as_it_must(restitution):
+    """Also where it has left the ground again before the next frame."""
     for number in range(20):
-        fall = next(generate(recipe(), [number]))
+        fall = next(generate(recipe(ground={'restitution': restitution}), [number]))
         height, rate = fall.drawn['start']['clearance'], 50
         hits = math.sqrt(2 * height / 9.8)
         assert fall.phases.impact == math.ceil(hits * rate)

@@ -8,6 +8,7 @@ import numpy as np
 from ..model import rotation
 from ..model.scene import Scene
 from ..people.fall_phases import Phases, bone_impacts
+from ..physics.sensors.contact_pulse import ContactPulse
 from ..physics.sensors.imu import ImuErrors, ImuMount, imu_samples, sensor_motion
 from ..physics.sensors.response import ImuResponse, ResponseFilter
 from .worst_impacts import WorstImpacts
@@ -36,7 +37,7 @@ class Fall:
     rates: np.ndarray
     """(t, k) rad/s."""
     touching: np.ndarray
-    """(t, n) whether each bone touches the ground."""
+    """(t, n) whether each bone touches the ground, or has since the frame before."""
     imus: list[dict]
     """The recipe's w inertial sensors."""
     samples_per_frame: int
@@ -55,6 +56,8 @@ class Fall:
     """Of each region of the body, by the limits of load_limits()."""
     feet: tuple[str, ...] = ()
     """Bones that may touch the ground before the impact."""
+    pulses: tuple[ContactPulse | None, ...] = ()
+    """Of the impacts in each sample after the first; none if no sensor has a contact_pulse."""
 
     @property
     def masses(self) -> np.ndarray:
@@ -103,7 +106,8 @@ def fall_samples(fall: Fall, imu: int) -> np.ndarray:
     """
     true = imu_samples(fall.imu_states[:, imu], mount_of(fall, imu),
                        fall.times[1] / fall.samples_per_frame, fall.scene.gravity,
-                       ResponseFilter(response_of(fall.imus[imu])))
+                       ResponseFilter(response_of(fall.imus[imu])),
+                       fall.pulses if fall.imus[imu].get('contact_pulse') else ())
     # Recipe.draw's counter begins with 0, a sensor's with 1 + imu: they are 2^128 draws apart.
     random = np.random.Generator(np.random.Philox(
         key=fall.noise_key, counter=[0, 0, 1 + imu, fall.number]))

@@ -13,6 +13,7 @@ from ..people import standing
 from ..people.fall_phases import ONSET_DURATION, Phases, find_phases
 from ..physics.guard import Guard
 from ..physics.rigid_body import GroundHeights
+from ..physics.sensors.contact_pulse import PulseLaw, PulseLog
 from ..physics.simulation import Simulation
 from .fall import Fall
 from .recipe import Recipe
@@ -36,6 +37,8 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     """Simulate the fall that begins at ``start``."""
     scene, frames, limits = start.scene, _Recorder(recipe, start), _limits()
     impacts = WorstImpacts.none_yet(scene, limits)
+    samples = (recipe.frames - 1) * recipe.samples_per_frame
+    pulses = PulseLog(PulseLaw(scene, limits), samples, 1 / recipe.rate / recipe.samples_per_frame)
     # Not 'auto': falls must not depend on which engines are installed.
     with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
         try:
@@ -57,6 +60,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
                 failure = bad.reason if bad else ''
                 if not bad and simulation.impacts:
                     impacts = impacts.after(simulation.impacts, limits)
+                    pulses.add(simulation.impacts)
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
@@ -65,7 +69,8 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
-                recipe.philox_key, impacts, tuple(recipe.data['feet']))
+                recipe.philox_key, impacts, tuple(recipe.data['feet']),
+                tuple(pulses.pulses) if any(imu.get('contact_pulse') for imu in recipe.imus) else ())
 
 
 def _events(simulation: Simulation, start: Start) -> list[tuple[int, Callable[[], None]]]:
@@ -92,12 +97,18 @@ class _Recorder:
         self.valid = 0
         bodies = start.scene.bodies
         self._furniture = [k for k, body in enumerate(bodies) if body.name not in recipe.floor]
+        self._floor = {'ground', *recipe.floor}
+        self._index_of = start.scene.bone_index
 
     def add(self, simulation: Simulation) -> None:
         """Record the current state as the next frame."""
         at = self.valid
         self.states[at] = simulation.state.rows
         self.touching[at] = self._bones_on_ground(simulation)
+        for impact in simulation.impacts if at else ():
+            # What bounces does not touch at the frame's instant.
+            if impact.against in self._floor:
+                self.touching[at, self._index_of(impact.bone)] = True
         self.angles[at], self.rates[at] = simulation.joint_angles, simulation.joint_rates
         if self._imu_bones:
             last = at * self._per_frame
