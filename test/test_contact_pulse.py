@@ -1,4 +1,4 @@
-"""A sensor reads impacts as long as the contact law's pulse: against a spring that is integrated."""
+"""A sensor reads impacts for as long as the contact law's pulse: against an integrated spring."""
 import dataclasses
 import math
 
@@ -12,9 +12,9 @@ from ragdoll_ros.falls.fall import fall_samples
 from ragdoll_ros.falls.recipe import load_recipe, recipe_of
 from ragdoll_ros.falls.simulate import generate
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
+from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.physics.sensors.contact_pulse import ContactPulse, PulseLaw, PulseLog, spread
 from ragdoll_ros.physics.sensors.imu import imu_samples
 from ragdoll_ros.physics.simulation import Simulation

@@ -66,11 +66,11 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     phases = find_phases(
         scene, states, touching, recipe.data['feet'], round(ONSET_DURATION * recipe.rate),
         **recipe.data['phases']) if frames.valid else Phases()
+    used = tuple(pulses.pulses) if any(imu.get('contact_pulse') for imu in recipe.imus) else ()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
-                recipe.philox_key, impacts, tuple(recipe.data['feet']),
-                tuple(pulses.pulses) if any(imu.get('contact_pulse') for imu in recipe.imus) else ())
+                recipe.philox_key, impacts, tuple(recipe.data['feet']), used)
 
 
 def _events(simulation: Simulation, start: Start) -> list[tuple[int, Callable[[], None]]]:

@@ -1,12 +1,18 @@
 """MotionSpline: the coordinates of a doll over time, as an animation has them."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from . import errors
+from . import errors, rotation
 from .dof_layout import DofLayout, GeneralizedState
+from .pose import Pose
+
+STRAIGHT = 1e-9
+"""rad: a smaller turn in a repetition is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +59,31 @@ class MotionSpline:
         """Of its last sample, s."""
         return float(self.times[-1])
 
+    @cached_property
+    def _advance(self) -> tuple[complex, float]:
+        """Translation x + iy, m, and turn about z, rad, that take the root from where it begins to
+        where it ends; height and tilt are not in it.
+        """
+        at, turned = self.layout.root_positions[0], self.layout.root_orientations[0]
+        begin, end = (complex(*self.q[k][at][:2]) for k in (0, -1))
+        whole = rotation.multiply(self.q[-1][turned], rotation.inverse(self.q[0][turned]))
+        turn = math.remainder(2 * math.atan2(whole[2], whole[3]), 2 * math.pi)
+        return end - _turned(begin, turn), turn
+
+    def repeated(self, count: int) -> Pose:
+        """Pose of the motion's frame after ``count`` repetitions, each of which begins where the
+        one before ended and faces as that did; height and tilt are those of the beginning.
+        """
+        step, turn = self._advance
+        if abs(turn) < STRAIGHT:
+            moved, turn = count * step, 0.0
+        else:
+            # The sum of step turned by 0, turn, ... (count - 1) turn.
+            sines = [rotation.sine_and_cosine(n * turn / 2)[0] for n in (count, 1)]
+            moved = _turned(step * sines[0] / sines[1], (count - 1) * turn / 2)
+        return Pose(np.array([moved.real, moved.imag, 0.0]),
+                    rotation.from_axis_angle((0.0, 0.0, 1.0), count * turn))
+
     def at(self, time: float) -> GeneralizedState:
         """Coordinates and velocities at ``time`` s. Raises OutOfRange."""
         errors.check_range('time', time, 0.0, self.duration)
@@ -80,6 +111,12 @@ class MotionSpline:
         bend, twist = 3 * rise - 2 * leave - arrive, leave + arrive - 2 * rise
         return (begin + s * (leave + s * (bend + s * twist)),
                 (leave + s * (2 * bend + s * 3 * twist)) / length)
+
+
+def _turned(place: complex, angle: float) -> complex:
+    """Turn x + iy by an angle, rad."""
+    sine, cosine = rotation.sine_and_cosine(angle)
+    return place * complex(cosine, sine)
 
 
 def _norms(layout: DofLayout, q: np.ndarray) -> np.ndarray:

@@ -28,7 +28,8 @@ class Playback:
         motion: of the doll in the animation's frame.
         start: s within the animation.
         speed: times as fast as in the file, above 0 to 100.
-        loop: whether it begins anew at its end; else the doll then stands until it goes limp.
+        loop: whether it is repeated, from where it ended and facing as there; else the doll then
+            stands until it goes limp.
         limp_at: s, when the doll goes limp; infinity: only when it is told to.
         limp_above: N: it goes limp when a push, a drive or a hand on it is stronger; infinity: none
             does that.
@@ -57,8 +58,15 @@ class Playback:
 
     def phase(self, elapsed: float) -> float:
         """Time within the animation, s, ``elapsed`` s after the start."""
+        return self._repetition(elapsed)[1]
+
+    def _repetition(self, elapsed: float) -> tuple[int, float]:
+        """Number of ends that have passed, and the time within the animation."""
         phase, duration = self.start + self.speed * elapsed, self.motion.duration
-        return phase % duration if self.loop else min(phase, duration)
+        if not self.loop:
+            return 0, min(phase, duration)
+        passed, rest = divmod(phase, duration)
+        return int(passed), rest
 
     def left(self, elapsed: float) -> float:
         """Time, s, from then on until the animation ends or begins anew; infinity after its end."""
@@ -76,7 +84,9 @@ class Playback:
             further: s by which to go on from there without beginning anew.
         """
         motion, layout = self.motion, self.motion.layout
-        phase = self.phase(elapsed)
+        passed, phase = self._repetition(elapsed)
+        if passed:
+            frame = frame.compose(motion.repeated(passed))
         there = motion.at(min(phase + self.speed * further, motion.duration))
         end = math.inf if self.loop else (motion.duration - self.start) / self.speed
         moves = elapsed < end
