@@ -1,4 +1,5 @@
 """Kinds of falls: of walkers who trip or slip, of people beside bodies."""
+import copy
 import math
 from pathlib import Path
 
@@ -110,7 +111,9 @@ def test_wrong_kinds_are_refused_with_all_errors():
 
 
 def test_recipes_without_these_keys_have_the_falls_that_they_had():
-    assert load_recipe('shove').digest.startswith(SHOVE_DIGEST)
+    data = copy.deepcopy(load_recipe('shove').data)
+    assert data['record']['imus'][0].pop('contact_pulse')
+    assert recipe_of(data).digest.startswith(SHOVE_DIGEST)
     assert f'{load_recipe("tumble").philox_key:032x}' == TUMBLE_KEY
 
 

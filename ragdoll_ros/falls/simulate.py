@@ -14,6 +14,7 @@ from ..people.fall_phases import ONSET_DURATION, Phases, find_phases
 from ..physics.guard import Guard
 from ..physics.rigid_body import GroundHeights
 from ..physics.sensors.contact_pulse import PulseLaw, PulseLog
+from ..physics.sensors.impacts import bones_that_hit
 from ..physics.simulation import Simulation
 from .fall import Fall
 from .recipe import Recipe
@@ -98,17 +99,14 @@ class _Recorder:
         bodies = start.scene.bodies
         self._furniture = [k for k, body in enumerate(bodies) if body.name not in recipe.floor]
         self._floor = {'ground', *recipe.floor}
-        self._index_of = start.scene.bone_index
 
     def add(self, simulation: Simulation) -> None:
         """Record the current state as the next frame."""
         at = self.valid
         self.states[at] = simulation.state.rows
         self.touching[at] = self._bones_on_ground(simulation)
-        for impact in simulation.impacts if at else ():
-            # What bounces does not touch at the frame's instant.
-            if impact.against in self._floor:
-                self.touching[at, self._index_of(impact.bone)] = True
+        if at:
+            self.touching[at] |= bones_that_hit(simulation.scene, simulation.impacts, self._floor)
         self.angles[at], self.rates[at] = simulation.joint_angles, simulation.joint_rates
         if self._imu_bones:
             last = at * self._per_frame

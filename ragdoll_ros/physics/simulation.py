@@ -280,7 +280,7 @@ class Simulation:
 
     @property
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,) touch the ground; cheaper than ``contacts``."""
+        """Which bones (n,) touch the ground or a static body; cheaper than ``contacts``."""
         return self._engine.bones_on_ground()
 
     @property

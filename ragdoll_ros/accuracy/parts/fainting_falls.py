@@ -12,6 +12,7 @@ import numpy as np
 from ...files.scene import load_scene
 from ...model import rotation
 from ...model.anthropometry import PERCENTILES, SEXES
+from ...model.biomechanical_limits import BiomechanicalLimits
 from ...model.coordinates import GeneralizedState
 from ...model.ragdoll import Ragdoll
 from ...model.scene import SECOND, Material, Placement, Scene
@@ -19,6 +20,7 @@ from ...people import person, standing
 from ...people.fall_phases import ONSET_DURATION, bone_impacts, find_phases, part_impact
 from ...people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS, Known
 from ...physics.rigid_body import GroundHeights
+from ...physics.sensors.impacts import bones_that_hit
 from ...physics.simulation import Simulation
 from ..results.figures import Row
 from ..results.markdown import table
@@ -106,10 +108,12 @@ def simulate(start: FaintingStart) -> tuple[np.ndarray, np.ndarray]:
     pelvis = start.scene.bone_index('pelvis')
     with Simulation(start.scene, accuracy='draft', engine='rigid') as simulation:
         _stand(simulation, start)
+        simulation.record_impacts(BiomechanicalLimits('none', {}))
         while True:
             state = simulation.state
             states.append(state.rows)
-            touching.append(simulation.bones_on_ground)
+            touching.append(simulation.bones_on_ground
+                            | bones_that_hit(start.scene, simulation.impacts, ('ground',)))
             lies = any(flags[pelvis] for flags in touching) and (
                 np.linalg.norm(state.linear_velocities, axis=1).max() < LYING_SPEED)
             if lies or simulation.time >= DURATION * SECOND:

@@ -333,7 +333,7 @@ class Engine(Protocol):
         """Impacts in the last advance(); None: they are not logged. IMPACTS."""
 
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,) touch the ground."""
+        """Which bones (n,) touch the ground or a static body."""
 
     @property
     def energy_excesses(self) -> np.ndarray:

@@ -10,6 +10,7 @@ peak, which is at the end of the compression, does not depend on that.
 from __future__ import annotations
 
 import math
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +78,15 @@ class Impact:
     def head_injury(self, window: float) -> float:
         """Head injury criterion of the contact law's pulse, s g^2.5; ``window``: HIC15, HIC36."""
         return half_sine_head_injury(self.peak_acceleration, self.duration, window)
+
+
+def bones_that_hit(scene: Scene, impacts: Iterable[Impact], what: Container[str]) -> np.ndarray:
+    """Which bones (n,) have an impact against one of ``what``: 'ground', or names of bodies. What
+    bounces within a tick touches nothing at its ends.
+    """
+    found = np.zeros(len(scene.bones), bool)
+    found[[scene.bone_index(each.bone) for each in impacts if each.against in what]] = True
+    return found
 
 
 class ImpactRecorder:
