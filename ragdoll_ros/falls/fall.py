@@ -8,7 +8,6 @@ import numpy as np
 from ..model import rotation
 from ..model.scene import Scene
 from ..people.fall_phases import Phases, bone_impacts
-from ..physics.sensors.contact_pulse import ContactPulse
 from ..physics.sensors.imu import ImuErrors, ImuMount, imu_samples, sensor_motion
 from ..physics.sensors.response import ImuResponse, ResponseFilter
 from .worst_impacts import WorstImpacts
@@ -56,8 +55,9 @@ class Fall:
     """Of each region of the body, by the limits of load_limits()."""
     feet: tuple[str, ...] = ()
     """Bones that may touch the ground before the impact."""
-    pulses: tuple[ContactPulse | None, ...] = ()
-    """Of the impacts in each sample after the first; none if no sensor has a contact_pulse."""
+    pulses: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """((t - 1) samples_per_frame,) s: duration of the impacts in the samples after the first; 0
+    where there is none."""
 
     @property
     def masses(self) -> np.ndarray:
@@ -107,7 +107,7 @@ def fall_samples(fall: Fall, imu: int) -> np.ndarray:
     true = imu_samples(fall.imu_states[:, imu], mount_of(fall, imu),
                        fall.times[1] / fall.samples_per_frame, fall.scene.gravity,
                        ResponseFilter(response_of(fall.imus[imu])),
-                       fall.pulses if fall.imus[imu].get('contact_pulse') else ())
+                       fall.pulses if fall.imus[imu].get('contact_pulse') else None)
     # Recipe.draw's counter begins with 0, a sensor's with 1 + imu: they are 2^128 draws apart.
     random = np.random.Generator(np.random.Philox(
         key=fall.noise_key, counter=[0, 0, 1 + imu, fall.number]))

@@ -11,10 +11,12 @@ from ..model.coordinates import GeneralizedState
 from ..model.errors import RagdollError
 from ..people import standing
 from ..people.fall_phases import ONSET_DURATION, Phases, find_phases
+from ..people.passive import end_widths
 from ..physics.guard import Guard
 from ..physics.rigid_body import GroundHeights
 from ..physics.sensors.contact_pulse import PulseLaw, PulseLog
 from ..physics.sensors.impacts import bones_that_hit
+from ..physics.sensors.joint_stop import JointStops
 from ..physics.simulation import Simulation
 from .fall import Fall
 from .recipe import Recipe
@@ -40,6 +42,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     impacts = WorstImpacts.none_yet(scene, limits)
     samples = (recipe.frames - 1) * recipe.samples_per_frame
     pulses = PulseLog(PulseLaw(scene, limits), samples, 1 / recipe.rate / recipe.samples_per_frame)
+    stops = JointStops(scene, end_widths(scene.dolls[0].doll))
     # Not 'auto': falls must not depend on which engines are installed.
     with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
         try:
@@ -62,16 +65,21 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
                 if not bad and simulation.impacts:
                     impacts = impacts.after(simulation.impacts, limits)
                     pulses.add(simulation.impacts)
+                for stop in [] if bad else stops.find(
+                        frames.joints, (simulation.joint_angles, simulation.joint_rates),
+                        1 / recipe.rate):
+                    # When within the tick is not known; what else it has is little beside.
+                    for sample in range(recipe.samples_per_frame):
+                        pulses.enter((frames.valid - 1) * recipe.samples_per_frame + sample, *stop)
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
         scene, states, touching, recipe.data['feet'], round(ONSET_DURATION * recipe.rate),
         **recipe.data['phases']) if frames.valid else Phases()
-    used = tuple(pulses.pulses) if any(imu.get('contact_pulse') for imu in recipe.imus) else ()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
-                recipe.philox_key, impacts, tuple(recipe.data['feet']), used)
+                recipe.philox_key, impacts, tuple(recipe.data['feet']), pulses.durations)
 
 
 def _events(simulation: Simulation, start: Start) -> list[tuple[int, Callable[[], None]]]:
@@ -99,6 +107,11 @@ class _Recorder:
         bodies = start.scene.bodies
         self._furniture = [k for k, body in enumerate(bodies) if body.name not in recipe.floor]
         self._floor = {'ground', *recipe.floor}
+
+    @property
+    def joints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Joint angles and rates of the last frame."""
+        return self.angles[self.valid - 1], self.rates[self.valid - 1]
 
     def add(self, simulation: Simulation) -> None:
         """Record the current state as the next frame."""

@@ -13,7 +13,7 @@ import math
 from dataclasses import replace
 
 from ..model.passive import Passive, PassiveEnd
-from ..model.ragdoll import Joint
+from ..model.ragdoll import Joint, Ragdoll
 
 GUARD_TORQUE = 200.0
 """N m of the table's man. Where a passive torque reaches it, beyond what a joint bears, the hard
@@ -47,12 +47,31 @@ TORQUES = {
 """By the name of an angle without its side."""
 
 
+ASSUMED_WIDTH = 0.09
+"""rad: of shoulders, elbows, wrists and neck, which the source has not: about its knee's and
+trunk's.
+"""
+
+
+def end_widths(doll: Ragdoll) -> dict[str, tuple[float, float]]:
+    """Widths in which the torques of a person's joint angles grow e-fold towards the lower and the
+    upper end, rad, by the angle's name; none for a doll without any angle of the source.
+    """
+    found = {name: _torque_of(name) for joint in doll.joints for name in joint.angle_names}
+    return {name: (torque.lower.width, torque.upper.width) if torque else (ASSUMED_WIDTH,) * 2
+            for name, torque in found.items()} if any(found.values()) else {}
+
+
+def _torque_of(name: str) -> Passive | None:
+    # 'r_waist' is a roll, 'r_knee' the right one.
+    return TORQUES.get(name, TORQUES.get(name[2:]))
+
+
 def with_passive_torques(joint: Joint, scale: float) -> Joint:
     """A joint with the torques that its angles have in the source, times ``scale``, and with hard
     limits beyond; the joint itself if it has none there.
     """
-    # 'r_waist' is a roll, 'r_knee' the right one.
-    found = [TORQUES.get(name, TORQUES.get(name[2:])) for name in joint.angle_names]
+    found = [_torque_of(name) for name in joint.angle_names]
     if not any(found):
         return joint
     limits = tuple(limit if each is None else _guards(each)

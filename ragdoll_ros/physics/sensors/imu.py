@@ -7,7 +7,7 @@ of SO(3) (Forster et al. 2017, IEEE T-RO 33:1, on preintegration). So the integr
 the motion. A sample with an impact contains its whole change of velocity: the peak depends on the
 sample rate, the sum does not.
 """
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from ...model.rotation import IDENTITY
 from ...model.state import State
 from ...model.vectors import Quaternion, Vector, finite_floats, unit_vector
 from ..rigid_body import cross
-from .contact_pulse import ContactPulse, spread
+from .contact_pulse import spread
 from .response import ResponseFilter
 
 SMALL = 1e-4
@@ -78,18 +78,19 @@ def sensor_motion(rows: np.ndarray, mount: ImuMount) -> tuple[np.ndarray, np.nda
 
 def imu_samples(rows: np.ndarray, mount: ImuMount, step: float, gravity: Sequence[float],
                 response: ResponseFilter | None = None,
-                pulses: Iterable[ContactPulse | None] = ()) -> np.ndarray:
+                pulses: np.ndarray | None = None) -> np.ndarray:
     """Samples (t, 6) between states of a bone that are ``step`` s apart, rows (t + 1, 13): specific
     force, m/s^2, and angular rate, rad/s, in the sensor's frame (REP 145). ``response`` has the
-    state of a soft mount and a low-pass filter; the mount acts on the force alone. ``pulses`` are
-    those of t samples over which impacts are spread, the force alone; none: they are instants.
+    state of a soft mount and a low-pass filter; the mount acts on the force alone. ``pulses``
+    (t,) are the durations, s, over which the impacts in each sample are spread, the force alone.
 
     The specific force is -gravity at rest and 0 in free fall. Rotations above pi in one sample are
     aliased.
     """
     response = response or ResponseFilter()
     _, turns, velocities = sensor_motion(rows, mount)
-    velocities = spread(velocities, step, np.asarray(gravity, float), pulses)
+    if pulses is not None:
+        velocities = spread(velocities, step, np.asarray(gravity, float), pulses)
     velocities = response.mounted(velocities, step, np.asarray(gravity, float))
     turned = rotation.rotation_vector(rotation.multiply(rotation.inverse(turns[:-1]), turns[1:]))
     changed = np.diff(velocities, axis=0) / step - np.asarray(gravity, float)
