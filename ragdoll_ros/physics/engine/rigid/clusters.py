@@ -733,7 +733,7 @@ def _each_doll(scene: Scene, like: Clusters | None) -> tuple[list[System], list[
     keys = _keys(scene)
     for key, placement in zip(keys, scene.dolls, strict=True):
         if key not in made:
-            alone = dataclasses.replace(scene, dolls=(placement,), bodies=())
+            alone = dataclasses.replace(scene, dolls=(placement,), bodies=(), robots=())
             made[key] = build_system(alone), contact_laws(alone)
     each = [made[key] for key in keys]
     return [system for system, _ in each], [laws for _, laws in each]

@@ -1,0 +1,217 @@
+"""Robot: links that driven bodies stand for, on a tree of joints that are told how to move."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from . import errors, rotation
+from .errors import set_fields
+from .pose import Pose
+from .rotation import IDENTITY
+from .vectors import Quaternion, Vector, finite_floats, unit_vector
+
+ROBOT_JOINTS = ('revolute', 'continuous', 'prismatic', 'fixed')
+"""Kinds of joints. A continuous one has the same pose after each turn."""
+
+Mimic = tuple[str, float, float]
+"""Name of a joint, multiplier and offset: the value is multiplier * that joint's + offset."""
+
+
+@dataclass(frozen=True)
+class RobotJoint:
+    """A joint of a robot. Its value is an angle, rad, right-handed about the axis, or a way, m.
+
+    Args:
+        name: unique in its robot.
+        kind: one of ROBOT_JOINTS.
+        parent, child: names of links.
+        position, orientation: (3,) m and quaternion x, y, z, w: the child's frame in the parent's
+            at zero.
+        axis: (3,), in the child's frame; normalised.
+        start: value at the start, rad or m.
+        mimic: None, or the Mimic of a joint that itself mimics none.
+
+    Raises:
+        WrongForm, NotFinite, NotUnit: for its fields.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation: Quaternion = IDENTITY
+    axis: Vector = (1.0, 0.0, 0.0)
+    start: float = 0.0
+    mimic: Mimic | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in ROBOT_JOINTS:
+            raise errors.WrongForm('kind', self.kind, 'one of ' + ', '.join(ROBOT_JOINTS))
+        set_fields(self, position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation,
+                                           'a quaternion x, y, z, w, not zero', 4),
+                   axis=unit_vector('axis', self.axis), start=float(self.start))
+        errors.check_finite('start', self.start)
+        if self.mimic is not None:
+            leader, *numbers = self.mimic
+            set_fields(self, mimic=(leader, *finite_floats('mimic', numbers, 2)))
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Links of a scene that Simulation.drive_body() moves together, by the values of joints.
+
+    Args:
+        name: unique among robots, dolls and bodies of the scene.
+        joints: RobotJoint objects of a tree; a link that is no child has the robot's frame.
+        links: names of placements of the scene, by the names of the links that they stand for: each
+            of one bone, whose frame is the link's, and which follows exactly.
+        position, orientation: pose of the robot's frame at the start, world frame: (3,) m, and
+            quaternion x, y, z, w.
+
+    Raises:
+        DuplicateName, ConnectedTwice, JointCycle, UnknownJoint, WrongForm, NotFinite, NotUnit: for
+            its fields.
+    """
+
+    name: str
+    joints: tuple[RobotJoint, ...]
+    links: Mapping[str, str] = field(hash=False)
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation: Quaternion = IDENTITY
+
+    def __post_init__(self) -> None:
+        set_fields(self, joints=tuple(self.joints), links=dict(self.links),
+                   position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation,
+                                           'a quaternion x, y, z, w, not zero', 4))
+        if not self.links:
+            raise errors.WrongForm('links', self.links, 'at least one link')
+        self._check_joints()
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of its frame at the start, world frame."""
+        return Pose(np.array(self.position), np.array(self.orientation))
+
+    @cached_property
+    def driven(self) -> tuple[RobotJoint, ...]:
+        """The k joints that move by themselves, in the order of all arrays of values."""
+        return tuple(joint for joint in self.joints if joint.kind != 'fixed' and not joint.mimic)
+
+    @cached_property
+    def indices(self) -> dict[str, int]:
+        """Index of each driven joint, by name."""
+        return {joint.name: index for index, joint in enumerate(self.driven)}
+
+    @cached_property
+    def mimics(self) -> frozenset[str]:
+        """Names of the joints that mimic another one."""
+        return frozenset(joint.name for joint in self.joints if joint.mimic)
+
+    @property
+    def start(self) -> np.ndarray:
+        """(k,) values of the driven joints at the start, rad or m."""
+        return np.array([joint.start for joint in self.driven], float)
+
+    @cached_property
+    def is_continuous(self) -> np.ndarray:
+        """(k,) which driven joints have the same pose after each turn."""
+        return np.array([joint.kind == 'continuous' for joint in self.driven], bool)
+
+    def link_poses(self, frame: Pose, values: np.ndarray) -> Pose:
+        """Poses (n,) of ``links``, in their order, world frame.
+
+        Args:
+            frame: of the robot, world frame.
+            values: (k,) of the driven joints, rad or m.
+        """
+        tree = self._tree
+        each = tree.multipliers * np.append(values, 0.0)[tree.leaders] + tree.offsets
+        angles, ways = each * tree.turns, each * ~tree.turns
+        local = tree.origins.copy()
+        local[:, :3, :3] += (np.sin(angles)[:, None, None] * tree.across
+                             + (1 - np.cos(angles))[:, None, None] * tree.twice_across)
+        local[:, :3, 3] += ways[:, None] * tree.axes
+        placed = np.empty((len(local) + 1, 4, 4))
+        placed[0] = np.eye(4)
+        placed[0, :3, :3], placed[0, :3, 3] = rotation.matrix(frame.orientation), frame.position
+        for index, parent in enumerate(tree.parents):
+            np.matmul(placed[parent], local[index], out=placed[index + 1])
+        found = placed[tree.links]
+        return Pose(found[:, :3, 3], rotation.from_matrix(found[:, :3, :3]))
+
+    def _check_joints(self) -> None:
+        names: set[str] = set()
+        parents: dict[str, str] = {}
+        for index, joint in enumerate(self.joints):
+            if joint.name in names:
+                raise errors.DuplicateName(f'joints[{index}].name', joint.name, 'a unique name')
+            if joint.child in parents:
+                raise errors.ConnectedTwice(f'joints[{index}].child', joint.child,
+                                            'a link without another parent')
+            above = joint.parent
+            while above != joint.child and above in parents:
+                above = parents[above]
+            if above == joint.child:
+                raise errors.JointCycle(f'joints[{index}]', joint.name, 'joints that form no loop')
+            names.add(joint.name)
+            parents[joint.child] = joint.parent
+        for index, joint in enumerate(self.joints):
+            if joint.mimic and joint.mimic[0] not in self.indices:
+                raise errors.UnknownJoint(f'joints[{index}].mimic', joint.mimic[0],
+                                          errors.one_of(list(self.indices), joint.mimic[0]))
+
+    @cached_property
+    def _tree(self) -> _Tree:
+        return _Tree(self)
+
+
+class _Tree:
+    """Arrays over those m joints of a robot that its links hang on, parents first."""
+
+    def __init__(self, robot: Robot) -> None:
+        above = {joint.child: joint for joint in robot.joints}
+        place: dict[str, int] = {}
+        """Of each link, among the robot's frame and the m links below it."""
+        joints: list[RobotJoint] = []
+        for link in robot.links:
+            path: list[RobotJoint] = []
+            while link in above and link not in place:
+                path.append(above[link])
+                link = above[link].parent
+            for joint in reversed(path):
+                joints.append(joint)
+                place[joint.child] = len(joints)
+        self.parents = [place.get(joint.parent, 0) for joint in joints]
+        """Of each joint, as in ``links``."""
+        self.links = [place.get(link, 0) for link in robot.links]
+        """(n,) 0: the robot's frame; i + 1: that of the child of joint i."""
+        still = len(robot.driven)
+        rules = [joint.mimic or (joint.name, 1.0, 0.0) for joint in joints]
+        self.leaders = [robot.indices.get(leader, still) if joint.kind != 'fixed' else still
+                        for joint, (leader, _, _) in zip(joints, rules, strict=True)]
+        """(m,) index of the driven joint that each follows; k: none."""
+        self.multipliers = np.array([multiplier for _, multiplier, _ in rules], float)
+        self.offsets = np.array([offset * (joint.kind != 'fixed') for joint, (_, _, offset)
+                                 in zip(joints, rules, strict=True)], float)
+        self.turns = np.array([joint.kind != 'prismatic' for joint in joints], bool)
+        self.origins = np.zeros((len(joints), 4, 4))
+        self.origins[:, 3, 3] = 1
+        skew = np.zeros((len(joints), 3, 3))
+        for origin, cross, joint in zip(self.origins, skew, joints, strict=True):
+            origin[:3, :3], origin[:3, 3] = rotation.matrix(joint.orientation), joint.position
+            x, y, z = joint.axis
+            cross[:] = (0, -z, y), (z, 0, -x), (-y, x, 0)
+        turned = self.origins[:, :3, :3]
+        self.across = turned @ skew
+        """(m, 3, 3) Rodrigues's formula in the parents' frames: what the sine of the angle
+        multiplies, and ``twice_across``: what 1 - cosine does."""
+        self.twice_across = self.across @ skew
+        self.axes = np.einsum('mij,mj->mi', turned, np.array(
+            [joint.axis for joint in joints], float).reshape(-1, 3))
+        """(m, 3) in the parents' frames."""
