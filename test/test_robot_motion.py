@@ -126,7 +126,8 @@ def test_joints_turn_links_along_their_arcs(tmp_path):
     """Also within a tick; then they stand, and the robot is stale."""
     with Simulation(robot(tmp_path)) as simulation:
         simulation.samples_per_tick = 4
-        simulation.drive_body('arm', joint_angles={'elbow': 0.05}, rates={'shoulder': 3, 'elbow': 2})
+        simulation.drive_body('arm', joint_angles={'elbow': 0.05},
+                              rates={'shoulder': 3, 'elbow': 2})
         for tick in range(1, 31):
             simulation.advance()
             for part, state in enumerate(simulation.substates):
@@ -227,7 +228,7 @@ def test_jumps_are_counted_and_give_no_blow(tmp_path):
         assert simulation.measures()['body_jumps_total'] == 1
         assert yaw(rows[0, -2]) == pytest.approx(2.5)
         assert not rows[:, :, 7:].any()
-        place, turn = tip(2.5, 0)
+        place, _ = tip(2.5, 0)
         assert rows[-1, -1, :2] == pytest.approx(place, abs=1e-12)
 
 
@@ -235,13 +236,13 @@ def test_its_links_do_not_collide_with_each_other(tmp_path):
     """Folded into itself, with a ball in reach of both links: only the ball is touched."""
     made = robot(tmp_path, doll=BALL.format(0.3, 0.06))
     with Simulation(made) as simulation:
-        for tick in range(60):
+        for _ in range(60):
             simulation.drive_body('arm', rates={'shoulder': 0.5, 'elbow': 5.0})
             simulation.advance()
             contacts = simulation.contacts
             assert all(0 in pair for pair in zip(contacts.a, contacts.b, strict=True))
         assert simulation.kinetic_energy > 0, 'they hit the ball'
-        place, turn = tip(0.3, 3.0)
+        _, turn = tip(0.3, 3.0)
         assert yaw(simulation.state.rows[-1]) == pytest.approx(turn - 2 * math.pi, abs=1e-9)
 
 
@@ -356,7 +357,7 @@ def test_a_link_is_set_and_removed_by_nobody(tmp_path):
     with Simulation(robot(tmp_path)) as simulation:
         with pytest.raises(errors.WrongForm, match=r'drive_body\(\) moves the robot arm'):
             simulation.set_state('arm_upper', (0, 0, 1))
-        with pytest.raises(errors.WrongForm, match='links.upper'):
+        with pytest.raises(errors.WrongForm, match=r'links\.upper'):
             simulation.remove('arm_upper')
 
 

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 from geometry_msgs.msg import Twist, Vector3
-from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from test_robot_motion import PLANAR, tip, yaw

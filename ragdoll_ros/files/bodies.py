@@ -31,7 +31,7 @@ MOTION = ('velocity', 'spin')
 EXACT = 'exact'
 
 
-class Bodies(NamedTuple):
+class SceneBodies(NamedTuple):
     """What `bodies:` of a scene says."""
 
     static: list[StaticBody]
@@ -41,11 +41,11 @@ class Bodies(NamedTuple):
     """What moves some of them."""
 
 
-def build_bodies(data: dict, folder: Path, found: list[ModelError]) -> Bodies:
+def build_bodies(data: dict, folder: Path, found: list[ModelError]) -> SceneBodies:
     """The bodies of a scene's data. Appends every error to ``found``. Paths are relative to
     ``folder``.
     """
-    static, loose, robots = bodies = Bodies([], [], [])
+    static, loose, robots = bodies = SceneBodies([], [], [])
     for index, entry in enumerate(entries(data, 'bodies')):
         where = f'bodies[{index}]'
         if has_error_under(found, where):

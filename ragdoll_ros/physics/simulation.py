@@ -326,12 +326,13 @@ class Simulation:
                    twist: Sequence[float] | None = None,
                    joint_angles: Mapping[str, float] | None = None,
                    rates: Mapping[str, float] | None = None) -> None:
-        """Move a body with `follow`, or a robot of several links: from now on at constant velocity until the next call, or for
-        0.2 s of simulated time. Then it stands, and is one of ``stale_bodies``.
+        """Move a body with `follow`, or a robot of several links: from now on at constant velocity
+        until the next call, or for 0.2 s of simulated time. Then it stands, and is one of
+        ``stale_bodies``.
 
-        What follows exactly is at the end of the next tick where pose and twist take it. A pose
-        farther away than 10 m/s explain in a tick places the body there, without a blow, and is
-        counted. Work on dolls is work of pushes.
+        What follows exactly is at the end of the next tick where pose and twist, or angles and
+        rates, take it. A pose, or a link's, farther away than 10 m/s explain in a tick places the
+        body there, without a blow, and is counted. Work on dolls is work of pushes.
 
         Joints that are not named, and the frame where joints alone are, go on as they were told,
         until 0.2 s after that. Limits of joints are not checked: who moves the robot keeps them.
@@ -371,8 +372,8 @@ class Simulation:
         return self._driven.stale(self.time)
 
     def body_pose(self, name: str) -> np.ndarray:
-        """Pose (7,) of the frame of a body with `follow`, or of a robot, world frame: x, y, z, m, and
-        quaternion x, y, z, w. Raises UnknownDoll: the scene has none of this name.
+        """Pose (7,) of the frame of a body with `follow`, or of a robot, in the world frame: x, y,
+        z, m, and quaternion x, y, z, w. Raises UnknownDoll: the scene has none of this name.
 
         >>> simulation.body_pose('robot')  # doctest: +SKIP
         """

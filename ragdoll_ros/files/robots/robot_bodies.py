@@ -13,8 +13,8 @@ from typing import Any
 from ...model import errors
 from ...model.compound import Compound
 from ...model.errors import ModelError
-from ...model.mesh import Mesh
 from ...model.follow import Follow
+from ...model.mesh import Mesh
 from ...model.plane import Plane
 from ...model.pose import Pose
 from ...model.ragdoll import Bone, Ragdoll
@@ -166,8 +166,8 @@ def _bodies(link: UrdfLink, pose: Pose, entry: dict, folder: Path,
         else:
             solids.append((shape, place))
     if others and 'follow' in entry:
-        raise errors.WrongForm('', f'a {others[0][0].kind}', f'{PRIMITIVES}, or `meshes: box`: none '
-                               f'else moves; leave the link out by `without: [{link.name}]`')
+        raise errors.WrongForm('', f'a {others[0][0].kind}', f'{PRIMITIVES}, or `meshes: box`: no '
+                               f'other moves; leave the link out by `without: [{link.name}]`')
     found: list[tuple[Any, Pose]] = solids if len(solids) == 1 else [
         (Compound(tuple(Part.at(shape, place) for shape, place in solids)), Pose())
     ] if solids else []

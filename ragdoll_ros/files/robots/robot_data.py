@@ -1,4 +1,4 @@
-"""`robots:` of a scene, as it is saved: the joints between those of its bodies that move together."""
+"""`robots:` of a scene, as it is saved: joints between those of its bodies that move together."""
 from ...model.errors import ModelError
 from ...model.robot import Robot, RobotJoint
 from ...model.rotation import IDENTITY

@@ -145,7 +145,7 @@ def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose) -> N
 
 
 def _joints(scope: SdfModel, frame: Pose, version: str) -> Iterator[SdfJoint]:
-    """Joints of a model between links; those that neither turn about one axis nor slide are fixed."""
+    """Joints of a model between links; those that neither turn nor slide are fixed."""
     for element in scope.element.findall('joint'):
         name = f'{scope.prefix}{element.get("name", "")}'
         ends = [child_text(element, end, f'joint {name}') for end in ('parent', 'child')]

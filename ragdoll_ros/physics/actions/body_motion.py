@@ -30,7 +30,7 @@ AT_REST: Twist = np.zeros(3), np.zeros(3)
 
 
 @dataclass
-class Motion:
+class TwistMotion:
     """Motion of a body's frame at constant twist."""
 
     pose: Pose

@@ -23,7 +23,7 @@ from .body_motion import (
     JUMP_SPEED,
     NEGLIGIBLE,
     TIMEOUT,
-    Motion,
+    TwistMotion,
     MotionCommand,
     Twist,
     checked_pose,
@@ -42,7 +42,7 @@ LEASH = 0.02
 
 
 @dataclass
-class _BoneMotion(Motion):
+class _BoneMotion(TwistMotion):
     """Motion of a body's frame, and how its bone gets there."""
 
     approach: Twist = AT_REST

@@ -23,7 +23,7 @@ from .body_motion import (
     JUMP_SPEED,
     NEGLIGIBLE,
     TIMEOUT,
-    Motion,
+    TwistMotion,
     MotionCommand,
     checked_pose,
     checked_twist,
@@ -35,7 +35,7 @@ ROUNDING = 1e-12
 
 
 @dataclass
-class _FrameMotion(Motion):
+class _FrameMotion(TwistMotion):
     """Motion of a robot's frame, which first gets from ``begin`` to it."""
 
     begin: Pose | None = None

@@ -1,5 +1,5 @@
-"""Subscriptions that move bodies with `follow` and robots: Odometry, a Twist or a JointState becomes
-drive_body().
+"""Subscriptions that move bodies with `follow`, and robots: Odometry, a Twist or a JointState
+becomes drive_body().
 """
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class BodySubscriptions:
 
     A pose is that of the body's frame in the world frame, whatever the message calls its frames: a
     robot's odometry has names of its own. Twists are along the body's axes, as nav_msgs and REP 103
-    have them. Those of a robot are its root link's. ``after`` is called when a body has been told how
-    to move.
+    have them. Those of a robot are its root link's. ``after`` is called when a body has been told
+    how to move.
     """
 
     def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None]) -> None:
