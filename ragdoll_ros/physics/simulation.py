@@ -814,13 +814,9 @@ class Simulation:
         """Integrate until ``end``, ns; no push begins or ends before."""
         loads: tuple[Wrenches, Springs, Drives] = (), self._springs, ()
         if self._follows:
-            for doll, velocity, spin in self._driven.twists(self.time, end):
-                self._engine.set_twist(doll, velocity, spin)
-            for dolls, velocities, spins in self._driven.link_twists(self.time, end, self.state):
-                layout, here = self._engine.layout, self._engine.coordinates
-                here.v[layout.root_velocities[dolls]] = velocities
-                here.v[layout.root_angular_velocities[dolls]] = spins
-                self._engine.set_motion(dolls.tolist(), here)
+            dolls, twists = self._driven.twists(self.time, end, self.state)
+            if dolls:
+                self._engine.set_twists(dolls, np.array(twists))
             loads = (), loads[1], self._driven.drives(self.time, self.state,
                                                       self._engine.sleeping)
             self.asleep = bool(self._engine.sleeping.all())

@@ -6,7 +6,6 @@ pulled to it by a stiff drive, whose target velocity has a part in proportion to
 """
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,9 +22,9 @@ from .body_motion import (
     JUMP_SPEED,
     NEGLIGIBLE,
     TIMEOUT,
-    TwistMotion,
     MotionCommand,
     Twist,
+    TwistMotion,
     checked_pose,
     checked_twist,
 )
@@ -212,23 +211,24 @@ class DrivenBodies:
         for body in (*self._exact, *self._robots.values()):
             body.engine_twist = None
 
-    def twists(self, time: int, end: int) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Dolls that follow exactly with their twists until ``end``, if these have changed."""
+    def twists(self, time: int, end: int,
+               state: State) -> tuple[list[int], list[tuple[float, ...]]]:
+        """Dolls (n,) that follow exactly and change their twists, and these (n, 6) until ``end``:
+        m/s and rad/s.
+        """
+        dolls: list[int] = []
+        twists: list[tuple[float, ...]] = []
         for body in self._exact:
             twist = body.twist(time, end)
             if body.engine_twist is None or not all(map(np.array_equal, twist, body.engine_twist)):
                 body.engine_twist = twist
-                yield body.doll, *twist
-
-    def link_twists(self, time: int, end: int,
-                    state: State) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Dolls (n,) of robots that change their twists, and these until ``end``: velocities
-        (n, 3) m/s, and angular velocities (n, 3) rad/s.
-        """
+                dolls.append(body.doll)
+                twists.append((*twist[0].tolist(), *twist[1].tolist()))
         for robot in self._robots.values():
-            dolls, velocities, spins = robot.changed_twists(time, end, state)
-            if len(dolls):
-                yield dolls, velocities, spins
+            more = robot.changed_twists(time, end, state)
+            dolls += more[0]
+            twists += more[1]
+        return dolls, twists
 
     def drives(self, time: int, state: State, sleeping: np.ndarray) -> list[AppliedDrive]:
         """Drives of the bodies that give way; none of those that sleep where they stand."""

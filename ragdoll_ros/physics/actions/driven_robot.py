@@ -6,6 +6,7 @@ at a constant rate, so that links move along their arcs.
 """
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ import numpy as np
 from ...model import errors, rotation
 from ...model.drive import MAX_SPEED
 from ...model.pose import Pose
-from ...model.robot import Robot
+from ...model.robot import Robot, Row
 from ...model.scene import SECOND, Scene
 from ...model.state import State
 from ...model.vectors import finite_floats
@@ -23,8 +24,8 @@ from .body_motion import (
     JUMP_SPEED,
     NEGLIGIBLE,
     TIMEOUT,
-    TwistMotion,
     MotionCommand,
+    TwistMotion,
     checked_pose,
     checked_twist,
 )
@@ -42,9 +43,12 @@ class _FrameMotion(TwistMotion):
     approach_end: int = -1
     """ns"""
 
+    def __post_init__(self) -> None:
+        self.goes_on = any(each.any() for each in self.twist)
+
     def at(self, time: int) -> Pose:
         if self.begin is None or time >= self.approach_end:
-            return super().at(time)
+            return super().at(time) if self.goes_on else self.pose
         goal, part = super().at(self.approach_end), (time - self.since) / (
             self.approach_end - self.since)
         turn = rotation.rotation_vector(rotation.multiply(
@@ -55,37 +59,34 @@ class _FrameMotion(TwistMotion):
 
     def moves(self, time: int) -> bool:
         """Whether it is on its way."""
-        return (self.begin is not None and time < self.approach_end) or any(
-            each.any() for each in self.twist_at(time))
+        return time < self.approach_end or (self.goes_on and time < self.end)
 
 
-class _JointMotions:
-    """Motions of k joints at constant rates, each first from ``begin`` to it. Times in ns."""
+@dataclass
+class _JointMotion:
+    """Motion of a joint at a constant rate, first from ``begin`` to it. Times in ns."""
 
-    def __init__(self, values: np.ndarray) -> None:
-        count = len(values)
-        self.begin, self.values, self.rates = values, values.copy(), np.zeros(count)
-        """(k,) rad or m when each was told, those that it was told; rad/s or m/s."""
-        self.since = np.full(count, -TIMEOUT)
-        self.approach_end = np.full(count, -TIMEOUT)
-        self.told = np.zeros(count, bool)
+    begin: float
+    """rad or m when it was told."""
+    value: float
+    """rad or m that it was told."""
+    rate: float = 0.0
+    """rad/s or m/s"""
+    since: int = -TIMEOUT
+    approach_end: int = -TIMEOUT
+    told: bool = False
 
-    def at(self, time: int) -> np.ndarray:
-        """(k,) values at ``time``."""
-        gone = (np.minimum(time, self.since + TIMEOUT) - self.since) / SECOND
-        near = time < self.approach_end
-        if not near.any():
-            return self.values + gone * self.rates
-        span = np.maximum(self.approach_end - self.since, 1)
-        goal = self.values + span / SECOND * self.rates
-        part = (time - self.since) / span
-        return np.where(near, self.begin + part * (goal - self.begin),
-                        self.values + gone * self.rates)
+    def at(self, time: int) -> float:
+        """Value at ``time``."""
+        if time < self.approach_end:
+            span = self.approach_end - self.since
+            goal = self.value + span / SECOND * self.rate
+            return self.begin + (time - self.since) / span * (goal - self.begin)
+        return self.value + (min(time, self.since + TIMEOUT) - self.since) / SECOND * self.rate
 
     def moves(self, time: int) -> bool:
-        """Whether one is on its way."""
-        return bool(((time < self.approach_end)
-                     | (time < self.since + TIMEOUT) & (self.rates != 0)).any())
+        """Whether it is on its way."""
+        return time < self.approach_end or (self.rate != 0 and time < self.since + TIMEOUT)
 
 
 class DrivenRobot:
@@ -98,15 +99,15 @@ class DrivenRobot:
                                 for doll in self.dolls])
         """(n,) m, from a link's frame to its farthest point at most."""
         self.jumps = 0
-        self.engine_twist: np.ndarray | None = None
+        self.engine_twist: list[tuple[float, ...]] | None = None
         """(n, 6) twists of the links that the engine has."""
         self._frame = _FrameMotion(robot.pose, AT_REST, -TIMEOUT)
-        self._joints = _JointMotions(robot.start)
+        self._joints = [_JointMotion(value, value) for value in robot.start.tolist()]
 
     def find_links(self, scene: Scene) -> None:
         """Find the dolls (n,) and bones (n,) of the links in a scene."""
         names = {placement.name: doll for doll, placement in enumerate(scene.dolls)}
-        self.dolls = np.array([names[name] for name in self.robot.links.values()])
+        self.dolls = [names[name] for name in self.robot.links.values()]
         self.bones = [scene.bone_slices[doll].start for doll in self.dolls]
 
     def frame(self, time: int) -> Pose:
@@ -115,18 +116,18 @@ class DrivenRobot:
 
     def is_stale(self, time: int) -> bool:
         """Whether nothing has moved it yet, or one of what was told to move stands again."""
-        times = [*self._joints.since[self._joints.told], *[self._frame.since] * self._frame.told]
+        times = [motion.since for motion in (self._frame, *self._joints) if motion.told]
         return not times or time >= min(times) + TIMEOUT
 
     def moves(self, time: int) -> bool:
         """Whether it is on its way."""
-        return self._frame.moves(time) or self._joints.moves(time)
+        return self._frame.moves(time) or any(joint.moves(time) for joint in self._joints)
 
     def changes(self) -> Iterator[int]:
         """Times at which motions change."""
-        yield from (self._frame.approach_end, self._frame.end)
-        yield from self._joints.approach_end.tolist()
-        yield from (self._joints.since + TIMEOUT).tolist()
+        for motion in (self._frame, *self._joints):
+            yield motion.approach_end
+            yield motion.since + TIMEOUT
 
     def drive(self, command: MotionCommand, time: int, tick: int,
               state: State) -> list[tuple[int, Pose]]:
@@ -139,66 +140,56 @@ class DrivenRobot:
         rates = self._checked('rates', command.rates, MAX_SPEED)
         moves_frame = not (pose is None and command.twist is None and command.moves_joints)
         was_told = (moves_frame and self._frame.told) or any(
-            self._joints.told[index] for index in (*angles, *rates))
+            self._joints[index].told for index in (*angles, *rates))
         begin = self._frame.at(time)
         if moves_frame:
             self._frame = _FrameMotion(begin if pose is None else pose, twist, time, True)
-        told = self._tell_joints(angles, rates, time)
+        for index in {**angles, **rates}:
+            self._tell_joint(index, angles.get(index), rates.get(index, 0.0), time)
         due = self.robot.link_poses(self._frame.pose if moves_frame else begin,
-                                    self._joints.at(time))
+                                    np.array([joint.at(time) for joint in self._joints]))
         off = np.linalg.norm(due.position - state.positions[self.bones], axis=1)
         off += self._reach * rotation.angle_between(due.orientation, state.orientations[self.bones])
         if off.max() > JUMP_SPEED * tick / SECOND:
             self.jumps += bool(was_told)
-            self._joints.begin[told] = self._joints.values[told]
             self.engine_twist = None
-            return list(zip(self.dolls.tolist(), map(Pose, *due), strict=True))
+            return list(zip(self.dolls, map(Pose, *due), strict=True))
         if pose is not None and _differ(begin, pose):
             self._frame.begin, self._frame.approach_end = begin, time + tick
-        joints = self._joints
-        told &= np.abs(joints.values - joints.begin) > NEGLIGIBLE
-        joints.approach_end[told] = time + tick
+        for index in angles:
+            joint = self._joints[index]
+            if abs(joint.value - joint.begin) > NEGLIGIBLE:
+                joint.approach_end = time + tick
         return []
 
     def changed_twists(self, time: int, end: int,
-                       state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Dolls (m,) of links whose twists change, and these until ``end``: velocities (m, 3) m/s
-        and angular velocities (m, 3) rad/s.
-        """
-        twists = np.zeros((len(self.dolls), 6))
-        bound = 0.0
+                       state: State) -> tuple[list[int], list[tuple[float, ...]]]:
+        """Dolls (m,) of links whose twists change, and these (m, 6) until ``end``: m/s, rad/s."""
+        twists, bound = [(0.0,) * 6] * len(self.dolls), 0.0
         if self.moves(time):
             seconds = (end - time) / SECOND
-            goal = self.robot.link_poses(self._frame.at(end), self._joints.at(end))
-            twists[:, :3] = (goal.position - state.positions[self.bones]) / seconds
-            twists[:, 3:] = rotation.rotation_vector(rotation.multiply(
-                goal.orientation, rotation.inverse(state.orientations[self.bones]))) / seconds
+            frame = self._frame.at(end)
+            goal = self.robot.link_rows((*frame.position.tolist(), *frame.orientation.tolist()),
+                                        [joint.at(end) for joint in self._joints])
             bound = ROUNDING / seconds
-            twists[np.abs(twists).max(axis=1) <= bound] = 0
-        if self.engine_twist is None:
-            self.engine_twist = np.full_like(twists, np.inf)
-        changed = np.abs(twists - self.engine_twist).max(axis=1) > bound
-        self.engine_twist[changed] = twists[changed]
-        return self.dolls[changed], twists[changed, :3], twists[changed, 3:]
+            twists = [_twist(*rows, seconds, bound) for rows in zip(
+                state.rows[self.bones].tolist(), goal, strict=True)]
+        before = self.engine_twist or [(math.inf,) * 6] * len(self.dolls)
+        changed = [index for index, pair in enumerate(zip(twists, before, strict=True))
+                   if any(abs(new - old) > bound for new, old in zip(*pair, strict=True))]
+        self.engine_twist = before
+        for index in changed:
+            before[index] = twists[index]
+        return [self.dolls[index] for index in changed], [twists[index] for index in changed]
 
-    def _tell_joints(self, angles: dict[int, float], rates: dict[int, float],
-                     time: int) -> np.ndarray:
-        """Let joints move at ``rates`` from ``angles`` on, by index; returns which (k,)."""
-        joints, here = self._joints, self._joints.at(time)
-        indices = [*angles, *(index for index in rates if index not in angles)]
-        joints.begin[indices] = joints.values[indices] = here[indices]
-        joints.values[list(angles)] = list(angles.values())
-        # A continuous joint takes the shorter way.
-        turned = joints.values - joints.begin
-        joints.begin += np.where(self.robot.is_continuous,
-                                 np.round(turned / (2 * np.pi)) * 2 * np.pi, 0)
-        joints.rates[indices] = 0
-        joints.rates[list(rates)] = list(rates.values())
-        joints.since[indices], joints.approach_end[indices] = time, -TIMEOUT
-        joints.told[indices] = True
-        told = np.zeros(len(here), bool)
-        told[indices] = True
-        return told
+    def _tell_joint(self, index: int, angle: float | None, rate: float, time: int) -> None:
+        """Let a joint move at a rate from an angle on; None: from where it is."""
+        begin = self._joints[index].at(time)
+        value = begin if angle is None else angle
+        if self.robot.driven[index].kind == 'continuous':
+            # It takes the shorter way.
+            begin += round((value - begin) / math.tau) * math.tau
+        self._joints[index] = _JointMotion(begin, value, rate, time, told=True)
 
     def _checked(self, key: str, given: Mapping[str, float] | None,
                  most: float) -> dict[int, float]:
@@ -216,6 +207,23 @@ class DrivenRobot:
             if name in robot.indices:
                 values[robot.indices[name]] = number
         return values
+
+
+def _twist(row: list[float], goal: Row, seconds: float, bound: float) -> tuple[float, ...]:
+    """Twist (6,) that takes a link from a ``row`` (13,) of a state to its ``goal`` in some seconds;
+    zero where that is rounding, ``bound``.
+    """
+    x, y, z, a, b, c, d, *_ = row
+    X, Y, Z, e, f, g, h = goal
+    # goal * inverse(row)
+    i, j, k, r = (e * d - h * a - f * c + g * b, f * d - h * b + e * c - g * a,
+                  g * d - h * c - e * b + f * a, h * d + e * a + f * b + g * c)
+    sine = math.hypot(i, j, k)
+    scale = (2 * math.atan2(sine, abs(r)) / sine if sine > 1e-12 else 2.0) / (
+        seconds if r >= 0 else -seconds)
+    twist = ((X - x) / seconds, (Y - y) / seconds, (Z - z) / seconds,
+             scale * i, scale * j, scale * k)
+    return twist if max(map(abs, twist)) > bound else (0.0,) * 6
 
 
 def _differ(a: Pose, b: Pose) -> bool:
