@@ -245,7 +245,7 @@ class DrivenBodies:
         """Time, until ``end``, at which a motion changes."""
         times = [at for body in self._bodies.values()
                  for at in (body.motion.approach_end, body.motion.end)]
-        times += [at for robot in self._robots.values() for at in robot.changes()]
+        times += [at for robot in self._robots.values() for at in robot.changes]
         return min((at for at in times if at > time), default=end)
 
 

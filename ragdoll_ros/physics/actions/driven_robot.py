@@ -7,7 +7,8 @@ at a constant rate, so that links move along their arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import operator
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,9 +58,10 @@ class _FrameMotion(TwistMotion):
                     rotation.multiply(rotation.from_rotation_vector(part * turn),
                                       self.begin.orientation))
 
-    def moves(self, time: int) -> bool:
-        """Whether it is on its way."""
-        return time < self.approach_end or (self.goes_on and time < self.end)
+    @property
+    def arrival(self) -> int:
+        """Time from which on it stands."""
+        return max(self.approach_end, self.end if self.goes_on else -TIMEOUT)
 
 
 @dataclass
@@ -82,11 +84,17 @@ class _JointMotion:
             span = self.approach_end - self.since
             goal = self.value + span / SECOND * self.rate
             return self.begin + (time - self.since) / span * (goal - self.begin)
-        return self.value + (min(time, self.since + TIMEOUT) - self.since) / SECOND * self.rate
+        return self.value + (min(time, self.end) - self.since) / SECOND * self.rate
 
-    def moves(self, time: int) -> bool:
-        """Whether it is on its way."""
-        return time < self.approach_end or (self.rate != 0 and time < self.since + TIMEOUT)
+    @property
+    def end(self) -> int:
+        """Time from which on its rate is zero."""
+        return self.since + TIMEOUT
+
+    @property
+    def arrival(self) -> int:
+        """Time from which on it stands."""
+        return max(self.approach_end, self.end if self.rate else -TIMEOUT)
 
 
 class DrivenRobot:
@@ -103,6 +111,10 @@ class DrivenRobot:
         """(n, 6) twists of the links that the engine has."""
         self._frame = _FrameMotion(robot.pose, AT_REST, -TIMEOUT)
         self._joints = [_JointMotion(value, value) for value in robot.start.tolist()]
+        self.changes: set[int] = set()
+        """Times at which motions change."""
+        self._arrival = -TIMEOUT
+        """Time from which on all stand."""
 
     def find_links(self, scene: Scene) -> None:
         """Find the dolls (n,) and bones (n,) of the links in a scene."""
@@ -116,18 +128,12 @@ class DrivenRobot:
 
     def is_stale(self, time: int) -> bool:
         """Whether nothing has moved it yet, or one of what was told to move stands again."""
-        times = [motion.since for motion in (self._frame, *self._joints) if motion.told]
-        return not times or time >= min(times) + TIMEOUT
+        ends = [motion.end for motion in (self._frame, *self._joints) if motion.told]
+        return not ends or time >= min(ends)
 
     def moves(self, time: int) -> bool:
         """Whether it is on its way."""
-        return self._frame.moves(time) or any(joint.moves(time) for joint in self._joints)
-
-    def changes(self) -> Iterator[int]:
-        """Times at which motions change."""
-        for motion in (self._frame, *self._joints):
-            yield motion.approach_end
-            yield motion.since + TIMEOUT
+        return time < self._arrival
 
     def drive(self, command: MotionCommand, time: int, tick: int,
               state: State) -> list[tuple[int, Pose]]:
@@ -153,6 +159,7 @@ class DrivenRobot:
         if off.max() > JUMP_SPEED * tick / SECOND:
             self.jumps += bool(was_told)
             self.engine_twist = None
+            self._note_times()
             return list(zip(self.dolls, map(Pose, *due), strict=True))
         if pose is not None and _differ(begin, pose):
             self._frame.begin, self._frame.approach_end = begin, time + tick
@@ -160,6 +167,7 @@ class DrivenRobot:
             joint = self._joints[index]
             if abs(joint.value - joint.begin) > NEGLIGIBLE:
                 joint.approach_end = time + tick
+        self._note_times()
         return []
 
     def changed_twists(self, time: int, end: int,
@@ -176,11 +184,17 @@ class DrivenRobot:
                 state.rows[self.bones].tolist(), goal, strict=True)]
         before = self.engine_twist or [(math.inf,) * 6] * len(self.dolls)
         changed = [index for index, pair in enumerate(zip(twists, before, strict=True))
-                   if any(abs(new - old) > bound for new, old in zip(*pair, strict=True))]
+                   if max(map(abs, map(operator.sub, *pair))) > bound]
         self.engine_twist = before
         for index in changed:
             before[index] = twists[index]
         return [self.dolls[index] for index in changed], [twists[index] for index in changed]
+
+    def _note_times(self) -> None:
+        """Note when motions change, and when all stand."""
+        motions = [self._frame, *self._joints]
+        self.changes = {at for motion in motions for at in (motion.approach_end, motion.end)}
+        self._arrival = max(motion.arrival for motion in motions)
 
     def _tell_joint(self, index: int, angle: float | None, rate: float, time: int) -> None:
         """Let a joint move at a rate from an angle on; None: from where it is."""
