@@ -11,7 +11,8 @@ from ragdoll_ros.ros.simulation_interfaces.servers import snake_case
 from ragdoll_ros.ros.simulation_interfaces.simulation_services import SimulationServices
 from ragdoll_ros.ros.simulation_interfaces.spawning import SpawnServices
 
-PATTERNS = {'~/bodies/*/odom', '~/bodies/*/cmd_vel', '~/imu/*/data_raw'}
+PATTERNS = {'~/bodies/*/odom', '~/bodies/*/cmd_vel', '~/bodies/*/joint_states',
+            '~/imu/*/data_raw'}
 """Topics below the node's own name that are named after bones and bodies of its scene."""
 
 POLICY = Path(__file__).resolve().parent.parent / 'config' / 'ragdoll.policy.xml'

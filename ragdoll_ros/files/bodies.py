@@ -3,6 +3,7 @@ driven ones, which follow what they are told.
 """
 import itertools
 from pathlib import Path
+from typing import NamedTuple
 
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange, WrongForm
@@ -11,13 +12,14 @@ from ..model.mesh import Surface
 from ..model.plane import Plane
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll
+from ..model.robot import Robot
 from ..model.rotation import IDENTITY
 from ..model.scene import Placement
 from ..model.static_body import DEFAULT_COLOR, StaticBody
 from ..model.vectors import floats
 from .doll import build_shape, shape_data
 from .repeat import Placed, repeated
-from .robots.robot_bodies import OPTIONS, PARSERS, PlacedRobot, read_robot
+from .robots.robot_bodies import NOMINAL_MASS, OPTIONS, PARSERS, PlacedRobot, read_robot
 from .schema import entries, has_error_under, try_build
 from .surfaces import build_surface, surface_data, surface_kind
 
@@ -28,25 +30,35 @@ MOTION = ('velocity', 'spin')
 
 EXACT = 'exact'
 
-NOMINAL_MASS = 1.0
-"""kg of a body that follows exactly and has no mass of its own. It has no effect."""
+
+class SceneBodies(NamedTuple):
+    """What `bodies:` of a scene says."""
+
+    static: list[StaticBody]
+    loose: list[Placement]
+    """All others, as dolls of one bone."""
+    robots: list[Robot]
+    """What moves some of them."""
 
 
-def build_bodies(data: dict, folder: Path,
-                 found: list[ModelError]) -> tuple[tuple[StaticBody, ...], list[Placement]]:
-    """The static bodies of a scene's data, and all others as dolls of one bone. Appends every
-    error to ``found``. Paths are relative to ``folder``.
+def build_bodies(data: dict, folder: Path, found: list[ModelError]) -> SceneBodies:
+    """The bodies of a scene's data. Appends every error to ``found``. Paths are relative to
+    ``folder``.
     """
-    static: list[StaticBody] = []
-    loose: list[Placement] = []
+    static, loose, robots = bodies = SceneBodies([], [], [])
     for index, entry in enumerate(entries(data, 'bodies')):
         where = f'bodies[{index}]'
         if has_error_under(found, where):
             continue
         if PARSERS.keys() & entry.keys():
-            robot = _robot(entry, folder, where, found)
-            static += itertools.islice(itertools.chain.from_iterable(
-                copy.bodies() for copy in _copies(robot, entry)), MOST_BODIES + 1)
+            copies = _copies(_robot(entry, folder, where, found), entry)
+            if 'follow' in entry:
+                loose += itertools.islice(itertools.chain.from_iterable(
+                    copy.placements() for copy in copies), MOST_BODIES + 1)
+                robots += [copy.robot() for copy in copies]
+            else:
+                static += itertools.islice(itertools.chain.from_iterable(
+                    copy.bodies() for copy in copies), MOST_BODIES + 1)
         elif _moves(entry):
             loose += _copies(try_build(found, where, _loose_body, entry), entry)
         else:
@@ -55,7 +67,7 @@ def build_bodies(data: dict, folder: Path,
             found.append(OutOfRange(where, len(static) + len(loose),
                                     f'at most {MOST_BODIES} bodies in all'))
             break
-    return tuple(static), loose
+    return bodies
 
 
 def follow_of(entry: dict) -> Follow | None:
@@ -88,9 +100,13 @@ def _copies(first: Placed | None, entry: dict) -> list[Placed]:
 
 def _robot(entry: dict, folder: Path, where: str, found: list[ModelError]) -> PlacedRobot | None:
     """The robot of an entry with a file. Appends every error to ``found``."""
-    for key in ('mass', 'follow', *MOTION):
+    for key in ('mass', *MOTION):
         if key in entry:
-            found.append(WrongForm(f'{where}.{key}', entry[key], 'none: a robot never moves'))
+            found.append(WrongForm(f'{where}.{key}', entry[key],
+                                   'none: a robot never moves, or as it is told, by `follow`'))
+    if entry.get('follow', EXACT) != EXACT:
+        found.append(WrongForm(f'{where}.follow', entry['follow'],
+                               'exact: forces move no robot of several links'))
     robot, more = read_robot(entry, folder)
     found += [error.at(where) for error in more]
     return robot

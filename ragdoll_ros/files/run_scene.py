@@ -15,6 +15,7 @@ from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement, Scene
 from . import yaml_text
 from .doll import doll_data
+from .robots.robot_data import robots_data
 from .scene import scene_data, scene_from_data
 
 LIBRARIES = ('ragdoll_ros', 'numpy', 'numba', 'pybullet', 'mujoco')
@@ -69,7 +70,8 @@ def run_scene_text(scene: Scene, texts: SceneTexts | None = None) -> str:
     scene_text(), which writes a doll that several placements share once.
     """
     texts = texts or SceneTexts()
-    data = scene_data(dataclasses.replace(scene, dolls=scene.dolls[:1]), data_of=lambda doll: None)
+    first = dataclasses.replace(scene, dolls=scene.dolls[:1], robots=())
+    data = scene_data(first, data_of=lambda doll: None) | robots_data(scene)
     text = yaml_text.to_text({**data, 'dolls': DOLLS}, 'scene', f'versions: {versions()}')
     seen: set[int] = set()
     anchors: dict[int, str] = {}

@@ -23,6 +23,7 @@ from .animation import load_animations, placed
 from .bodies import body_data, build_bodies, follow_data, follow_of
 from .doll import build_doll, doll_data
 from .repeat import repeated
+from .robots.robot_data import build_robots, robots_data
 from .schema import (
     has_error_under,
     is_marked,
@@ -116,12 +117,13 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
         if len(placements) > MOST_DOLLS:
             found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
             break
-    static, loose = build_bodies(data, path.parent, found)
-    placements += loose
-    if len(placements) > MOST_DOLLS and loose:
+    bodies = build_bodies(data, path.parent, found)
+    placements += bodies.loose
+    if len(placements) > MOST_DOLLS and bodies.loose:
         found.append(OutOfRange('bodies', len(placements),
                                 f'at most {MOST_DOLLS} dolls and loose bodies in all'))
-    parts: dict[str, Any] = {'bodies': static}
+    parts: dict[str, Any] = {'bodies': bodies.static,
+                             'robots': [*bodies.robots, *build_robots(data, found)]}
     for key, part in (('ground', Ground), ('material', Material)):
         if isinstance(data.get(key), dict) and not has_error_under(found, key):
             parts[key] = try_build(found, key, part, **data[key])
@@ -167,7 +169,7 @@ def scene_data(scene: Scene, folder: Path | None = None,
         data['dolls'].append(entry)
     if scene.bodies:
         data['bodies'] = [body_data(body) for body in scene.bodies]
-    return data
+    return data | robots_data(scene)
 
 
 def scene_text(scene: Scene, folder: Path, head: str = '') -> str:

@@ -18,6 +18,7 @@ from .forward_kinematics import BoneMotion, bone_motions
 from .playback import Playback
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
+from .robot import Robot
 from .rotation import IDENTITY
 from .static_body import StaticBody
 from .vectors import Quaternion, Vector, finite_floats, unit_vector
@@ -268,6 +269,7 @@ class Scene:
         self_collision: whether the bones of a doll collide with each other.
         description: a sentence on it.
         bodies: StaticBody objects; their names differ from each other and from the dolls'.
+        robots: Robot objects, whose links are dolls of one bone that follow exactly.
 
     Raises:
         WrongForm, OutOfRange, NotPositive, NotFinite, DuplicateName: for its fields.
@@ -287,10 +289,11 @@ class Scene:
     self_collision: bool = True
     description: str = ''
     bodies: tuple[StaticBody, ...] = ()
+    robots: tuple[Robot, ...] = ()
 
     def __post_init__(self) -> None:
         set_fields(self, dolls=tuple(self.dolls), bodies=tuple(self.bodies),
-                   gravity=finite_floats('gravity', self.gravity))
+                   robots=tuple(self.robots), gravity=finite_floats('gravity', self.gravity))
         if not self.dolls:
             raise errors.WrongForm('dolls', (), 'at least one doll')
         for value in self.gravity:
@@ -298,11 +301,27 @@ class Scene:
         errors.check_range('step', self.step, *STEP_RANGE)
         errors.check_positive('pace', self.pace)
         names: set[str] = set()
-        for key in ('dolls', 'bodies'):
+        for key in ('dolls', 'bodies', 'robots'):
             for index, one in enumerate(getattr(self, key)):
                 if one.name in names:
                     raise errors.DuplicateName(f'{key}[{index}].name', one.name, 'a unique name')
                 names.add(one.name)
+        self._check_robots()
+
+    def _check_robots(self) -> None:
+        follow = {placement.name for placement in self.dolls if placement.is_kinematic}
+        linked: set[str] = set()
+        for index, robot in enumerate(self.robots):
+            for link, name in robot.links.items():
+                if name not in follow or name in linked:
+                    raise errors.WrongForm(f'robots[{index}].links.{link}', name,
+                                           'a body with `follow: exact` of its own')
+                linked.add(name)
+
+    @cached_property
+    def robot_of_body(self) -> dict[str, str]:
+        """Name of the robot of each placement that is a link of one, by the placement's name."""
+        return {name: robot.name for robot in self.robots for name in robot.links.values()}
 
     @cached_property
     def bones(self) -> tuple[Bone, ...]:

@@ -61,10 +61,16 @@ class LoggedSimulation(Simulation):
         return ended
 
     def drive_body(self, name: str, pose: Sequence[float] | None = None,
-                   twist: Sequence[float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> None:
-        super().drive_body(name, pose, twist)
-        self.on_event('drive_body', {'name': name, 'twist': list(map(float, twist)),
-                                     'pose': None if pose is None else list(map(float, pose))})
+                   twist: Sequence[float] | None = None,
+                   joint_angles: Mapping[str, float] | None = None,
+                   rates: Mapping[str, float] | None = None) -> None:
+        super().drive_body(name, pose, twist, joint_angles, rates)
+        joints = {'joint_angles': joint_angles, 'rates': rates}
+        self.on_event('drive_body', {
+            'name': name, 'twist': None if twist is None else list(map(float, twist)),
+            'pose': None if pose is None else list(map(float, pose)),
+            **{key: {joint: float(value) for joint, value in values.items()}
+               for key, values in joints.items() if values is not None}})
 
     def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
              target: Sequence[float] | None = None) -> None:

@@ -22,6 +22,7 @@ from ..model.state import State
 from ..model.vectors import finite_floats, unit_vector
 from .accuracy import Accuracy, resolve_accuracy
 from .actions.animations import Animations
+from .actions.body_motion import MotionCommand
 from .actions.driven_bodies import DrivenBodies
 from .actions.grab import DRAG_TIME, Grab, Hands, checked_point
 from .actions.joint_springs import JointSpring, JointSprings
@@ -322,29 +323,41 @@ class Simulation:
         return self._pushes.release(channel)
 
     def drive_body(self, name: str, pose: Sequence[float] | None = None,
-                   twist: Sequence[float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> None:
-        """Move a body with `follow`: from now on at constant velocity until the next call, or for
-        0.2 s of simulated time. Then it stands, and is one of ``stale_bodies``.
+                   twist: Sequence[float] | None = None,
+                   joint_angles: Mapping[str, float] | None = None,
+                   rates: Mapping[str, float] | None = None) -> None:
+        """Move a body with `follow`, or a robot of several links: from now on at constant velocity
+        until the next call, or for 0.2 s of simulated time. Then it stands, and is one of
+        ``stale_bodies``.
 
-        What follows exactly is at the end of the next tick where pose and twist take it. A pose
-        farther away than 10 m/s explain in a tick places the body there, without a blow, and is
-        counted. Work on dolls is work of pushes.
+        What follows exactly is at the end of the next tick where pose and twist, or angles and
+        rates, take it. A pose, or a link's, farther away than 10 m/s explain in a tick places the
+        body there, without a blow, and is counted. Work on dolls is work of pushes.
+
+        Joints that are not named, and the frame where joints alone are, go on as they were told,
+        until 0.2 s after that. Limits of joints are not checked: who moves the robot keeps them.
 
         Args:
-            name: of the body.
+            name: of the body or the robot.
             pose: (7,) of its frame, world frame: x, y, z, m, and quaternion x, y, z, w; None: from
                 where it is.
-            twist: (6,) world frame: velocity of the frame's origin, m/s, angular velocity, rad/s.
+            twist: (6,) world frame: velocity of the frame's origin, m/s, angular velocity, rad/s;
+                None: at rest.
+            joint_angles: of a robot: rad, or m of joints that slide, by the names of its joints; of
+                those that are in ``rates`` alone: from where they are. What mimics another may be
+                named, and follows that.
+            rates: rad/s or m/s; of those that are in ``joint_angles`` alone: zero.
 
         Raises:
-            UnknownDoll: the scene has no such body with `follow`.
-            NotFinite, NotUnit, WrongForm, OutOfRange: for a pose or twist that is none.
+            UnknownDoll: the scene has no such body with `follow`, and no such robot.
+            UnknownJoint: the robot has no such joint.
+            NotFinite, NotUnit, WrongForm, OutOfRange: for what is no pose, twist, angle or rate.
 
         >>> simulation.drive_body('robot', twist=(1, 0, 0, 0, 0, 0))  # doctest: +SKIP
+        >>> simulation.drive_body('arm', rates={'elbow': 0.5})  # doctest: +SKIP
         """
-        jump = self._driven.drive(name, pose, twist, self.time, self.tick, self.state)
-        if jump is not None:
-            doll, placed = jump
+        command = MotionCommand(pose, twist, joint_angles, rates)
+        for doll, placed in self._driven.drive(name, command, self.time, self.tick, self.state):
             layout, here = self._engine.layout, self._engine.coordinates
             here.q[layout.root_positions[doll]] = placed.position
             here.q[layout.root_orientations[doll]] = placed.orientation
@@ -353,8 +366,18 @@ class Simulation:
 
     @property
     def stale_bodies(self) -> tuple[str, ...]:
-        """Names of bodies with `follow` that drive_body() has not moved for 0.2 s."""
+        """Names of bodies with `follow` that drive_body() has not moved for 0.2 s; of a robot, if
+        one of what it had moved, its frame or a joint, it has not since.
+        """
         return self._driven.stale(self.time)
+
+    def body_pose(self, name: str) -> np.ndarray:
+        """Pose (7,) of the frame of a body with `follow`, or of a robot, in the world frame: x, y,
+        z, m, and quaternion x, y, z, w. Raises UnknownDoll: the scene has none of this name.
+
+        >>> simulation.body_pose('robot')  # doctest: +SKIP
+        """
+        return np.concatenate(self._driven.pose(name, self.time, self.state))
 
     def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
              target: Sequence[float] | None = None) -> None:
@@ -541,12 +564,14 @@ class Simulation:
         Raises:
             UnknownDoll, UnknownJoint: the scene has no such doll, or the doll no such angle.
             NotFinite, NotUnit, WrongForm, OutOfRange: for a vector or quaternion that is none, a
-                position that is too far away, or an angle outside its limits.
+                position that is too far away, an angle outside its limits, or a robot's link.
 
         >>> simulation.set_state('doll', velocity=(0, 0, 2)).linear_velocities[0].round(6).tolist()
         [0.0, 0.0, 2.0]
         """
         index, layout = self._doll_index(doll), self._engine.layout
+        if (robot := self.scene.robot_of_body.get(doll)) is not None:
+            raise errors.WrongForm('doll', doll, f'none: drive_body() moves the robot {robot}')
         self._release([index], 'set_state')
         here = self._engine.coordinates
         for values, own, name, given, checked in (
@@ -597,7 +622,7 @@ class Simulation:
 
         Raises:
             UnknownDoll: the scene has no such doll.
-            WrongForm: it is the only doll, or the engine is not rigid.
+            WrongForm: it is the only doll, or a robot's link, or the engine is not rigid.
         """
         return self.carry_out(self.prepare_remove(doll))
 
@@ -789,8 +814,9 @@ class Simulation:
         """Integrate until ``end``, ns; no push begins or ends before."""
         loads: tuple[Wrenches, Springs, Drives] = (), self._springs, ()
         if self._follows:
-            for doll, velocity, spin in self._driven.twists(self.time, end):
-                self._engine.set_twist(doll, velocity, spin)
+            dolls, twists = self._driven.twists(self.time, end, self.state)
+            if dolls:
+                self._engine.set_twists(dolls, np.array(twists))
             loads = (), loads[1], self._driven.drives(self.time, self.state,
                                                       self._engine.sleeping)
             self.asleep = bool(self._engine.sleeping.all())

@@ -71,8 +71,8 @@ class SleepDetector:
         self._restarted = False
         """Whether all timers are at their start."""
 
-    def restart(self, dolls: np.ndarray | slice = slice(None)) -> None:
-        """Reset the timers of these dolls (d,), or of all."""
+    def restart(self, dolls: np.ndarray | list[int] | slice = slice(None)) -> None:
+        """Reset the timers of these dolls, a mask (d,) or indices, or of all."""
         self._still[dolls], self._wait[dolls] = 0, self._time
         self.watched[dolls], self._bound[dolls] = False, math.inf
 
@@ -114,9 +114,9 @@ class SleepDetector:
         all_move().
         """
         ready = self._update(engine.state, engine.doll_totals.kinetic, tick)
-        for bone in loaded:
-            self.restart(self._doll[bone])
-            ready[self._doll[bone]] = False
+        if dolls := self._doll[list(loaded)].tolist():
+            self.restart(dolls)
+            ready[dolls] = False
         if not np.count_nonzero(ready):
             return ready
         clusters = engine.cluster_of_doll

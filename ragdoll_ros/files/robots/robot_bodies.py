@@ -1,7 +1,7 @@
-"""Static bodies from a URDF or SDF: one of the primitive shapes of each link, and one of each plane
-and each mesh that a link has.
+"""Bodies from a URDF or SDF, in a scene's `bodies:` the entries `{urdf: FILE}` and `{sdf: FILE}`.
 
-In a scene's `bodies:` these are the entries `{urdf: FILE}` and `{sdf: FILE}`.
+Static ones: one of the primitive shapes of each link, and one of each plane and each mesh that a
+link has. With `follow` a robot that moves: a body of each link, in the link's frame.
 """
 import dataclasses
 import math
@@ -13,19 +13,31 @@ from typing import Any
 from ...model import errors
 from ...model.compound import Compound
 from ...model.errors import ModelError
+from ...model.follow import Follow
 from ...model.mesh import Mesh
 from ...model.plane import Plane
 from ...model.pose import Pose
+from ...model.ragdoll import Bone, Ragdoll
+from ...model.robot import ROBOT_JOINTS, Robot, RobotJoint
 from ...model.rotation import IDENTITY
-from ...model.scene import LIMIT_TOLERANCE
+from ...model.scene import LIMIT_TOLERANCE, Placement
 from ...model.shapes import Box, Part, Shape
-from ...model.static_body import StaticBody
+from ...model.static_body import DEFAULT_COLOR, StaticBody
 from ...model.vectors import Quaternion, Vector, floats
 from ..config import config_folder
 from ..doll import plain_name
 from .mesh_file import bounding_box, find_file, read_hull, read_mesh, read_surface
 from .sdf_tree import parse_sdf
-from .urdf_tree import PLANE, UrdfLink, UrdfMesh, UrdfTree, parse_urdf
+from .urdf_tree import (
+    PLANE,
+    ROTATING_KINDS,
+    UrdfJoint,
+    UrdfLink,
+    UrdfMesh,
+    UrdfMimic,
+    UrdfTree,
+    parse_urdf,
+)
 from .xml_text import read_xml
 
 PARSERS = {'urdf': ('robot', parse_urdf), 'sdf': ('sdf', parse_sdf)}
@@ -34,10 +46,11 @@ PARSERS = {'urdf': ('robot', parse_urdf), 'sdf': ('sdf', parse_sdf)}
 OPTIONS = ('angles_deg', 'meshes', 'without')
 """Keys of entries with a file alone."""
 
+NOMINAL_MASS = 1.0
+"""kg of a body that follows exactly and has no mass of its own. It has no effect."""
+
 SURFACE = ('friction', 'rolling_friction', 'restitution', 'color')
 """Keys of entries that hold for the bodies of all links."""
-
-ROTATING_KINDS = ('revolute', 'continuous')
 
 MESHES = ('box', 'hull', 'exact')
 """What `meshes` may be."""
@@ -51,20 +64,46 @@ PRIMITIVES = 'a box, sphere, cylinder or capsule'
 @dataclass(frozen=True)
 class PlacedRobot:
     """The bodies of a file's links, in the file's frame; and the pose of that frame in the world:
-    ``position`` (3,) m, ``orientation`` x, y, z, w.
+    ``position`` (3,) m, ``orientation`` x, y, z, w. With ``joints`` it is one that moves: its
+    ``links`` are in their own frames, whose poses in the file's are ``poses``.
     """
 
     name: str
     links: tuple[StaticBody, ...]
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Quaternion = IDENTITY
+    joints: tuple[RobotJoint, ...] = ()
+    poses: tuple[Pose, ...] = ()
 
     def bodies(self) -> Iterator[StaticBody]:
         """The bodies in the world, named robot_link."""
-        frame = Pose(floats(self.position), floats(self.orientation))
         for body in self.links:
-            yield dataclasses.replace(body, name=plain_name(f'{self.name}_{body.name}', self.name),
-                                      **_placed(frame.compose(body.pose)))
+            yield dataclasses.replace(body, name=self._name_of(body),
+                                      **_placed(self._frame.compose(body.pose)))
+
+    def placements(self) -> Iterator[Placement]:
+        """The links in the world, named robot_link; the frame of each is that of its bone."""
+        for body, pose in zip(self.links, self.poses, strict=True):
+            name = self._name_of(body)
+            # With moments, shapes need not be centred: nothing that acts on it moves it.
+            bone = Bone(name, Compound(body.parts), NOMINAL_MASS, (0.0, 0.0, 0.0), IDENTITY,
+                        body.friction, body.rolling_friction, body.restitution,
+                        body.color or DEFAULT_COLOR, moments=(1.0, 1.0, 1.0))
+            yield Placement(Ragdoll(name, (bone,)), follow=Follow(),
+                            **_placed(self._frame.compose(pose)))
+
+    def robot(self) -> Robot:
+        """What moves the links."""
+        return Robot(self.name, self.joints, {body.name: self._name_of(body)
+                                              for body in self.links},
+                     self.position, self.orientation)
+
+    @property
+    def _frame(self) -> Pose:
+        return Pose(floats(self.position), floats(self.orientation))
+
+    def _name_of(self, body: StaticBody) -> str:
+        return plain_name(f'{self.name}_{body.name}', self.name)
 
 
 def read_robot(entry: dict, folder: Path) -> tuple[PlacedRobot | None, list[ModelError]]:
@@ -80,23 +119,33 @@ def read_robot(entry: dict, folder: Path) -> tuple[PlacedRobot | None, list[Mode
     except ModelError as error:
         return None, [error.at(f'{key}.({path.name})')]
     try:
-        poses = tree.poses(_angles(tree, entry.get('angles_deg', {})))
+        leaders = _leaders(tree)
+        values = _values(tree, leaders, entry.get('angles_deg', {}))
         left_out = _left_out(tree, entry.get('without', ()))
     except ModelError as error:
         return None, [error]
+    poses, moves = tree.poses(values), 'follow' in entry
     surface = {name: entry[name] for name in SURFACE if name in entry}
     links: list[StaticBody] = []
     found: list[ModelError] = []
     for link in (link for name, link in tree.links.items() if name not in left_out):
         try:
             if link.collides:
-                links += _bodies(link, poses[link.name], entry, path.parent, surface)
+                links += _bodies(link, Pose() if moves else poses[link.name], entry, path.parent,
+                                 surface)
         except ModelError as error:
             found.append(error.at(f'{key}.({path.name}).link {link.name}'))
     if not links and not found:
         found = [errors.WrongForm(key, entry[key], 'a file with a link that has a <collision>')]
-    start = {name: entry[name] for name in ('position', 'orientation') if name in entry}
-    return (None if found else PlacedRobot(entry['name'], tuple(links), **start)), found
+    if found:
+        return None, found
+    start: dict[str, Any] = {name: entry[name] for name in ('position', 'orientation')
+                             if name in entry}
+    if moves:
+        start |= {'poses': tuple(poses[body.name] for body in links), 'joints': tuple(
+            _robot_joint(joint, values, leaders.get(child))
+            for child, joint in tree.joints.items())}
+    return PlacedRobot(entry['name'], tuple(links), **start), []
 
 
 def _bodies(link: UrdfLink, pose: Pose, entry: dict, folder: Path,
@@ -116,6 +165,9 @@ def _bodies(link: UrdfLink, pose: Pose, entry: dict, folder: Path,
             others.append((shape, place))
         else:
             solids.append((shape, place))
+    if others and 'follow' in entry:
+        raise errors.WrongForm('', f'a {others[0][0].kind}', f'{PRIMITIVES}, or `meshes: box`: no '
+                               f'other moves; leave the link out by `without: [{link.name}]`')
     found: list[tuple[Any, Pose]] = solids if len(solids) == 1 else [
         (Compound(tuple(Part.at(shape, place) for shape, place in solids)), Pose())
     ] if solids else []
@@ -142,9 +194,46 @@ def _placed(pose: Pose) -> dict[str, Any]:
     return {'position': floats(pose.position), 'orientation': floats(pose.orientation)}
 
 
-def _angles(tree: UrdfTree, given: dict[str, float]) -> dict[str, float]:
-    """Angles of all joints, rad by child, of which some are ``given``, degrees by name."""
-    joints = {joint.name: joint for joint in tree.joints.values() if joint.kind in ROTATING_KINDS}
+def _leaders(tree: UrdfTree) -> dict[str, UrdfMimic]:
+    """What each joint that mimics another follows, by child; that one mimics none. Raises
+    UnknownJoint, JointCycle.
+    """
+    by_name = {joint.name: joint for joint in tree.joints.values()}
+    leaders = {}
+    for child, joint in tree.joints.items():
+        mimic, passed = joint.mimics, {joint.name}
+        while mimic is not None:
+            leader, multiplier, offset = mimic
+            where = f'joint {joint.name}.mimic'
+            if leader not in by_name:
+                raise errors.UnknownJoint(where, leader, errors.one_of(list(by_name), leader))
+            if leader in passed:
+                raise errors.JointCycle(where, leader, 'a joint that does not mimic this one')
+            passed.add(leader)
+            leaders[child], mimic = mimic, by_name[leader].mimics
+            if mimic is not None:
+                mimic = UrdfMimic(mimic.joint, multiplier * mimic.multiplier,
+                                  multiplier * mimic.offset + offset)
+    return leaders
+
+
+def _robot_joint(joint: UrdfJoint, values: dict[str, float],
+                 leader: UrdfMimic | None) -> RobotJoint:
+    """A joint of a robot that moves; of a kind that has not one axis it is fixed."""
+    kind = joint.kind if joint.kind in ROBOT_JOINTS else 'fixed'
+    return RobotJoint(joint.name, kind, joint.parent, joint.child, floats(joint.origin.position),
+                      floats(joint.origin.orientation), floats(joint.axis),
+                      values.get(joint.child, 0.0),
+                      None if leader is None or kind == 'fixed' else tuple(leader))
+
+
+def _values(tree: UrdfTree, leaders: dict[str, UrdfMimic],
+            given: dict[str, float]) -> dict[str, float]:
+    """Values of all joints, rad or m by child, of which some are ``given``, degrees by name; those
+    that have ``leaders`` follow them.
+    """
+    joints = {joint.name: joint for joint in tree.joints.values()
+              if joint.kind in ROTATING_KINDS and joint.child not in leaders}
     angles = tree.initial_angles
     for name, value in given.items():
         where = f'angles_deg.{name}'
@@ -156,6 +245,9 @@ def _angles(tree: UrdfTree, given: dict[str, float]) -> dict[str, float]:
         if not lower - LIMIT_TOLERANCE <= angle <= upper + LIMIT_TOLERANCE:
             raise errors.OutOfRange(where, value, f'{math.degrees(lower):.6g} to '
                                     f'{math.degrees(upper):.6g} degrees, its limits')
+    children = {joint.name: child for child, joint in tree.joints.items()}
+    for child, (leader, multiplier, offset) in leaders.items():
+        angles[child] = multiplier * angles.get(children[leader], 0.0) + offset
     return angles
 
 

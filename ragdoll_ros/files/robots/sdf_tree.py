@@ -13,7 +13,16 @@ from ...model import errors, rotation
 from ...model.pose import Pose
 from ...model.shapes import SIZES
 from .sdf_frames import SdfModel, child_text
-from .urdf_tree import PLANE, UrdfJoint, UrdfLink, UrdfMesh, UrdfTree, add_plane, add_shape
+from .urdf_tree import (
+    PLANE,
+    ROTATING_KINDS,
+    UrdfJoint,
+    UrdfLink,
+    UrdfMesh,
+    UrdfTree,
+    add_plane,
+    add_shape,
+)
 from .xml_text import parse_numbers, parse_root
 
 WORLD = ''
@@ -136,7 +145,7 @@ def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose) -> N
 
 
 def _joints(scope: SdfModel, frame: Pose, version: str) -> Iterator[SdfJoint]:
-    """Joints of a model between links; those of other kinds than revolute are fixed."""
+    """Joints of a model between links; those that neither turn nor slide are fixed."""
     for element in scope.element.findall('joint'):
         name = f'{scope.prefix}{element.get("name", "")}'
         ends = [child_text(element, end, f'joint {name}') for end in ('parent', 'child')]
@@ -144,10 +153,11 @@ def _joints(scope: SdfModel, frame: Pose, version: str) -> Iterator[SdfJoint]:
         if child is None:
             continue
         pose = scope.place(element, ends[1])
-        rotating = element.get('type') in ('revolute', 'continuous')
-        yield SdfJoint(name, 'revolute' if rotating else 'fixed',
+        kind = element.get('type', '')
+        rotating, moving = kind in ROTATING_KINDS, kind in (*ROTATING_KINDS, 'prismatic')
+        yield SdfJoint(name, kind if moving else 'fixed',
                        WORLD if parent is None else parent, child, frame.compose(pose),
-                       _axis(scope, element, pose, version) if rotating else X,
+                       _axis(scope, element, pose, version) if moving else X,
                        _limits(element, f'joint {name}.limit') if rotating else None)
 
 

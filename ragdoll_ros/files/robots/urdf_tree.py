@@ -4,6 +4,7 @@ Transmissions, sensors, colours and what else has no part in the motion are not 
 """
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,6 +21,9 @@ SHORTEST = 1e-9
 PLANE = 'plane'
 
 JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
+
+
+ROTATING_KINDS = ('revolute', 'continuous')
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,14 @@ class UrdfLink:
     """Whether it has PyBullet's <contact>: friction, restitution."""
 
 
+class UrdfMimic(NamedTuple):
+    """That a joint has the value multiplier * that of ``joint`` + offset."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
 @dataclass
 class UrdfJoint:
     """A joint: ``origin`` is the child's frame in the parent's at zero, ``axis`` in the child's."""
@@ -66,8 +78,7 @@ class UrdfJoint:
     damping: float
     friction: float = 0.0
     """Coulomb friction, N m (N if prismatic)."""
-    mimics: str | None = None
-    """Name of the joint of its <mimic>."""
+    mimics: UrdfMimic | None = None
 
 
 @dataclass
@@ -95,17 +106,20 @@ class UrdfTree:
         return {child: float(np.clip(0.0, *joint.limits)) for child, joint in self.joints.items()
                 if joint.limits}
 
-    def poses(self, angles: dict[str, float]) -> dict[str, Pose]:
-        """Pose of every link in the root's frame at joint angles (rad, by child, default zero)."""
+    def poses(self, values: dict[str, float]) -> dict[str, Pose]:
+        """Pose of every link in the root's frame at joint angles, or ways of prismatic joints (rad
+        or m, by child, default zero).
+        """
         placed: dict[str, Pose] = {}
         for name in self.order:
             joint = self.joints.get(name)
             if joint is None:
                 placed[name] = Pose()
                 continue
-            turn = rotation.from_axis_angle(joint.axis, angles.get(name, 0.0))
-            origin = placed[joint.parent].compose(joint.origin)
-            placed[name] = origin.compose(Pose(orientation=turn))
+            value, origin = values.get(name, 0.0), placed[joint.parent].compose(joint.origin)
+            placed[name] = origin.compose(
+                Pose(value * joint.axis) if joint.kind == 'prismatic' else
+                Pose(orientation=rotation.from_axis_angle(joint.axis, value)))
         return placed
 
 
@@ -193,7 +207,7 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
     found = element.find('axis')
     axis = np.array([1.0, 0, 0]) if found is None else _vector(found, 'xyz', where)
     if np.linalg.norm(axis) < SHORTEST:
-        if kind in ('revolute', 'continuous'):
+        if kind in ROTATING_KINDS:
             raise errors.NotUnit(f'{where}.axis', axis.tolist(), 'a direction, not zero')
         axis = np.array([1.0, 0, 0])
     found = element.find('limit')
@@ -206,7 +220,9 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
     damping, friction = (0.0 if found is None else _number(found, key, where, 0.0)
                          for key in ('damping', 'friction'))
     found = element.find('mimic')
-    mimics = None if found is None else found.get('joint', '')
+    mimics = None if found is None else UrdfMimic(
+        found.get('joint', ''), *(_number(found, key, where, default)
+                                  for key, default in (('multiplier', 1.0), ('offset', 0.0))))
     return UrdfJoint(name, kind, *ends, _pose(element, where), axis / np.linalg.norm(axis), limits,
                      max(damping, 0.0), friction, mimics)
 

@@ -140,7 +140,7 @@ def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], light: Collectio
         if joint.kind == 'floating':
             notes.append(f'{joint.name}: floating joints are not supported: a ball joint')
         if joint.mimics is not None and joint.kind in ('revolute', 'continuous'):
-            notes.append(f'{joint.name}: mimics {joint.mimics}: becomes an independent joint')
+            notes.append(f'{joint.name}: mimics {joint.mimics.joint}: becomes an independent joint')
     if any(joint.kind in ('floating', 'spherical') for joint in chain):
         ball = next(joint for joint in chain if joint.kind in ('floating', 'spherical'))
         anchor, turn = poses[ball.child]

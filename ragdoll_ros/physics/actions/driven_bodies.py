@@ -6,29 +6,29 @@ pulled to it by a stiff drive, whose target velocity has a part in proportion to
 """
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...model import errors, rotation
-from ...model.drive import MAX_SPEED
 from ...model.pose import Pose
 from ...model.scene import SECOND, Scene
 from ...model.scene_change import SceneChange
 from ...model.state import State
-from ...model.vectors import clamp_norm, finite_floats, unit_vector
+from ...model.vectors import clamp_norm
 from ..engine.protocol import AppliedDrive
-from .grab import checked_point
-
-TIMEOUT = SECOND // 5
-"""ns for which a body moves on after its last twist."""
-
-JUMP_SPEED = 10.0
-"""m/s: a pose that is farther away than this speed explains in a tick is a jump."""
-
-NEGLIGIBLE = 1e-9
-"""m or rad: a body that is this near to its motion has reached it."""
+from .body_motion import (
+    AT_REST,
+    JUMP_SPEED,
+    NEGLIGIBLE,
+    TIMEOUT,
+    MotionCommand,
+    Twist,
+    TwistMotion,
+    checked_pose,
+    checked_twist,
+)
+from .driven_robot import DrivenRobot
 
 DRIVE_TIME = 1e-3
 """s in which a drive without limits would take up a difference of velocity."""
@@ -39,43 +39,14 @@ CATCH_UP_TIME, CATCH_UP_SPEED = 0.1, 1.0
 LEASH = 0.02
 """m by which a twist without a pose lets a motion get ahead of a body that gives way."""
 
-Twist = tuple[np.ndarray, np.ndarray]
-"""Velocity (3,) m/s and angular velocity (3,) rad/s, world frame."""
-
-AT_REST: Twist = np.zeros(3), np.zeros(3)
-
 
 @dataclass
-class _Motion:
-    """Motion of a body's frame at constant twist."""
+class _BoneMotion(TwistMotion):
+    """Motion of a body's frame, and how its bone gets there."""
 
-    pose: Pose
-    """At ``since``."""
-    twist: Twist
-    """Of the frame's origin."""
-    since: int
-    """ns"""
-    told: bool = False
-    """Whether anybody has asked for it."""
     approach: Twist = AT_REST
     """Of the bone, until ``approach_end``, ns."""
     approach_end: int = -1
-
-    def at(self, time: int) -> Pose:
-        """Pose of the frame at ``time``, ns."""
-        gone = (min(time, self.end) - self.since) / SECOND
-        velocity, spin = self.twist
-        return Pose(self.pose.position + gone * velocity, rotation.multiply(
-            rotation.from_rotation_vector(gone * spin), self.pose.orientation))
-
-    @property
-    def end(self) -> int:
-        """Time, ns, from which on it stands."""
-        return self.since + TIMEOUT
-
-    def twist_at(self, time: int) -> Twist:
-        """Twist of the frame's origin at ``time``, ns."""
-        return self.twist if time < self.end else AT_REST
 
 
 class _Body:
@@ -94,15 +65,15 @@ class _Body:
 
     def hold(self, state: State, time: int) -> None:
         """Stand where it is, from ``time``, ns, on."""
-        self.motion = _Motion(self._frame(state), AT_REST, time - TIMEOUT)
+        self.motion = _BoneMotion(self.frame(state), AT_REST, time - TIMEOUT)
         self.engine_twist = None
 
     def drive(self, pose: Pose | None, twist: Twist, time: int, tick: int,
               state: State) -> Pose | None:
         """Begin a motion at ``time``. Returns the pose of the bone where it jumps to, if so."""
-        before, here = self.motion, self._frame(state)
+        before, here = self.motion, self.frame(state)
         due = here if self.placement.is_kinematic else before.at(time)
-        self.motion = _Motion(
+        self.motion = _BoneMotion(
             pose or (here if self._distance(due, here) > LEASH else due), twist, time, True)
         if pose is None:
             return None
@@ -154,7 +125,7 @@ class _Body:
                             (bone.mass / DRIVE_TIME, max(bone.inertia) / DRIVE_TIME),
                             (follow.max_force, follow.max_torque))
 
-    def _frame(self, state: State) -> Pose:
+    def frame(self, state: State) -> Pose:
         """Pose of the body's frame in a state."""
         return Pose(state.positions[self.bone], state.orientations[self.bone]).compose(
             self.shape_pose.relative(Pose()))
@@ -166,11 +137,14 @@ class _Body:
 
 
 class DrivenBodies:
-    """All bodies of a scene with `follow`. Times in ns."""
+    """All bodies of a scene with `follow`, alone or as links of a robot. Times in ns."""
 
     def __init__(self, scene: Scene, state: State) -> None:
+        linked = scene.robot_of_body
+        self._robots = {robot.name: DrivenRobot(scene, robot) for robot in scene.robots}
         self._set_bodies({placement.name: _Body(scene, doll, state)
-                          for doll, placement in enumerate(scene.dolls) if placement.follow})
+                          for doll, placement in enumerate(scene.dolls)
+                          if placement.follow and placement.name not in linked})
 
     def _set_bodies(self, bodies: dict[str, _Body]) -> None:
         self._bodies = bodies
@@ -185,29 +159,46 @@ class DrivenBodies:
                 body.doll, body.bone = bodies[name].doll, bodies[name].bone
                 bodies[name] = body
         self._set_bodies(bodies)
+        for robot in self._robots.values():
+            robot.find_links(change.after)
 
     @property
     def jumps(self) -> int:
         """Jumps of all bodies since the start."""
-        return sum(body.jumps for body in self._bodies.values())
+        return sum(body.jumps for body in (*self._bodies.values(), *self._robots.values()))
 
     def stale(self, time: int) -> tuple[str, ...]:
         """Names of the bodies that have no motion any more, or none yet."""
-        return tuple(name for name, body in self._bodies.items() if time >= body.motion.end)
+        return (*(name for name, body in self._bodies.items() if time >= body.motion.end),
+                *(name for name, robot in self._robots.items() if robot.is_stale(time)))
 
-    def drive(self, name: str, pose: Sequence[float] | None, twist: Sequence[float], time: int,
-              tick: int, state: State) -> tuple[int, Pose] | None:
-        """Begin a motion; see Simulation.drive_body(). Returns the doll and the pose of its bone if
-        it jumps there.
+    def drive(self, name: str, command: MotionCommand, time: int, tick: int,
+              state: State) -> list[tuple[int, Pose]]:
+        """Begin a motion; see Simulation.drive_body(). Returns the dolls that jump, and the pose of
+        the bone of each.
         """
+        if name in self._robots:
+            return self._robots[name].drive(command, time, tick, state)
+        body = self._body(name)
+        for key in ('joint_angles', 'rates'):
+            if getattr(command, key) is not None:
+                raise errors.WrongForm(key, getattr(command, key), f'none: {name} is no robot')
+        pose = None if command.pose is None else checked_pose(command.pose)
+        jump = body.drive(pose, checked_twist(command.twist), time, tick, state)
+        return [] if jump is None else [(body.doll, jump)]
+
+    def pose(self, name: str, time: int, state: State) -> Pose:
+        """Pose of the frame of a body, world frame. Raises UnknownDoll."""
+        robot = self._robots.get(name)
+        return robot.frame(time) if robot else self._body(name).frame(state)
+
+    def _body(self, name: str) -> _Body:
+        """The body of a name. Raises UnknownDoll."""
         if name not in self._bodies:
-            expected = errors.one_of(list(self._bodies), name) if self._bodies else (
-                'a body with follow; the scene has none')
-            raise errors.UnknownDoll('name', name, expected)
-        motion = None if pose is None else _checked_pose(pose)
-        body = self._bodies[name]
-        jump = body.drive(motion, _checked_twist(twist), time, tick, state)
-        return None if jump is None else (body.doll, jump)
+            names = [*self._bodies, *self._robots]
+            raise errors.UnknownDoll('name', name, errors.one_of(names, name) if names else (
+                'a body with follow; the scene has none'))
+        return self._bodies[name]
 
     def hold(self, doll: int, state: State, time: int) -> None:
         """Let a doll, if it is one of these bodies, stand where it is."""
@@ -217,16 +208,27 @@ class DrivenBodies:
 
     def forget_twists(self) -> None:
         """The engine's twists are not those that were set: another state was restored."""
-        for body in self._exact:
+        for body in (*self._exact, *self._robots.values()):
             body.engine_twist = None
 
-    def twists(self, time: int, end: int) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Dolls that follow exactly with their twists until ``end``, if these have changed."""
+    def twists(self, time: int, end: int,
+               state: State) -> tuple[list[int], list[tuple[float, ...]]]:
+        """Dolls (n,) that follow exactly and change their twists, and these (n, 6) until ``end``:
+        m/s and rad/s.
+        """
+        dolls: list[int] = []
+        twists: list[tuple[float, ...]] = []
         for body in self._exact:
             twist = body.twist(time, end)
             if body.engine_twist is None or not all(map(np.array_equal, twist, body.engine_twist)):
                 body.engine_twist = twist
-                yield body.doll, *twist
+                dolls.append(body.doll)
+                twists.append((*twist[0].tolist(), *twist[1].tolist()))
+        for robot in self._robots.values():
+            more = robot.changed_twists(time, end, state)
+            dolls += more[0]
+            twists += more[1]
+        return dolls, twists
 
     def drives(self, time: int, state: State, sleeping: np.ndarray) -> list[AppliedDrive]:
         """Drives of the bodies that give way; none of those that sleep where they stand."""
@@ -235,30 +237,18 @@ class DrivenBodies:
 
     def moving_bones(self, time: int) -> list[int]:
         """Indices of the bones of bodies that are on their way."""
-        return [body.bone for body in self._bodies.values() if body.moves(time)]
+        return [*(body.bone for body in self._bodies.values() if body.moves(time)),
+                *(bone for robot in self._robots.values() if robot.moves(time)
+                  for bone in robot.bones)]
 
     def next_change(self, time: int, end: int) -> int:
         """Time, until ``end``, at which a motion changes."""
         times = [at for body in self._bodies.values()
                  for at in (body.motion.approach_end, body.motion.end)]
+        times += [at for robot in self._robots.values() for at in robot.changes]
         return min((at for at in times if at > time), default=end)
 
 
 def _catch_up(missing: np.ndarray) -> np.ndarray:
     """Velocity (3,) towards what is ``missing``, m or rad."""
     return np.array(clamp_norm((missing / CATCH_UP_TIME).tolist(), CATCH_UP_SPEED)[0])
-
-
-def _checked_pose(values: Sequence[float]) -> Pose:
-    numbers = finite_floats('pose', values, 7)
-    return Pose(np.array(checked_point('pose', numbers[:3])), np.array(unit_vector(
-        'pose', numbers[3:], 'a quaternion x, y, z, w, not zero', 4)))
-
-
-def _checked_twist(values: Sequence[float]) -> Twist:
-    twist = np.array(finite_floats('twist', values, 6))
-    for part in (twist[:3], twist[3:]):
-        if np.linalg.norm(part) > MAX_SPEED:
-            raise errors.OutOfRange('twist', tuple(twist.tolist()),
-                                    f'at most {MAX_SPEED:g} m/s and rad/s')
-    return twist[:3], twist[3:]

@@ -258,9 +258,9 @@ class Engine(Protocol):
         its bones that overlap at new joint angles, as by set_coordinates().
         """
 
-    def set_twist(self, doll: int, velocity: np.ndarray, spin: np.ndarray) -> None:
-        """Set the velocity (3,) m/s of the centre of mass and the angular velocity (3,) rad/s,
-        world frame, at which a doll that follows exactly moves from now on; wake its cluster.
+    def set_twists(self, dolls: Sequence[int], twists: np.ndarray) -> None:
+        """Set the twists (n, 6), world frame, at which ``dolls`` that follow exactly move from now
+        on: velocity of the centre of mass, m/s, and angular velocity, rad/s; wake their clusters.
         DRIVEN_BODIES.
         """
 

@@ -1,4 +1,6 @@
-"""Subscriptions that move bodies with `follow`: Odometry or a Twist becomes drive_body()."""
+"""Subscriptions that move bodies with `follow`, and robots: Odometry, a Twist or a JointState
+becomes drive_body().
+"""
 from __future__ import annotations
 
 import re
@@ -9,46 +11,54 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
 
 from ...model import errors, rotation
 from ...model.drive import MAX_SPEED
-from ...model.pose import Pose
-from ...model.scene import Placement
+from ...model.scene import Scene
 from ...model.vectors import unit_vector
 from ...physics.simulation import Simulation
 from .input_counts import InputCounts
+from .joint_values import joint_values
 from .subscriptions import limited
+
+JOINTS = 'joint_states'
 
 
 class BodySubscriptions:
-    """Subscriptions to ~/bodies/<name>/odom and ~/bodies/<name>/cmd_vel, for each driven body.
+    """Subscriptions to ~/bodies/<name>/odom and ~/bodies/<name>/cmd_vel, for each driven body and
+    robot, and to ~/bodies/<name>/joint_states, for each robot.
 
     A pose is that of the body's frame in the world frame, whatever the message calls its frames: a
     robot's odometry has names of its own. Twists are along the body's axes, as nav_msgs and REP 103
-    have them. ``after`` is called when a body has been told how to move.
+    have them. Those of a robot are its root link's. ``after`` is called when a body has been told
+    how to move.
     """
 
     def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None]) -> None:
         self._node, self._counts, self._after = node, counts, after
         self._subscriptions: list[Subscription] = []
-        self._names: tuple[str, ...] = ()
+        self._names: tuple[list[str], list[str]] = [], []
+        """Of all that is driven, and of robots."""
         self.simulation: Simulation
 
     def set_simulation(self, simulation: Simulation) -> None:
         """Move the bodies of this simulation, and subscribe for those of its scene."""
         self.simulation = simulation
-        names = tuple(each.name for each in simulation.scene.dolls if each.follow)
+        names = _driven_names(simulation.scene)
         if names == self._names:
             return
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._names = names
+        driven, robots = names
         self._subscriptions = [
             self._node.create_subscription(kind, f'{body_topic(name)}/{end}',
                                            partial(callback, name), 10)
-            for name in names
-            for kind, end, callback in ((Odometry, 'odom', self.on_odometry),
-                                        (Twist, 'cmd_vel', self.on_cmd_vel))]
+            for kind, end, callback, own in ((Odometry, 'odom', self.on_odometry, driven),
+                                             (Twist, 'cmd_vel', self.on_cmd_vel, driven),
+                                             (JointState, JOINTS, self.on_joint_states, robots))
+            for name in own]
 
     def on_odometry(self, name: str, message: Odometry) -> None:
         """Move a body on from a pose; a message that is wrong is refused and counted."""
@@ -66,9 +76,19 @@ class BodySubscriptions:
         """Move a body on from where it is; a message that is wrong is refused and counted."""
         source = f'{body_topic(name)}/cmd_vel'
         try:
-            self._drive(source, name, None, self._orientation(name), message)
+            self._drive(source, name, None, self.simulation.body_pose(name)[3:], message)
         except errors.ModelError as error:
             self._counts.refuse(source, error)
+
+    def on_joint_states(self, name: str, message: JointState) -> None:
+        """Move joints of a robot on; a message that is wrong is refused and counted."""
+        try:
+            angles, rates = joint_values(message)
+            self.simulation.drive_body(name, joint_angles=angles, rates=rates)
+        except errors.ModelError as error:
+            self._counts.refuse(f'{body_topic(name)}/{JOINTS}', error)
+        else:
+            self._after()
 
     def _drive(self, source: str, name: str, pose: Sequence[float] | None,
                orientation: Sequence[float], twist: Twist) -> None:
@@ -79,17 +99,12 @@ class BodySubscriptions:
         self.simulation.drive_body(name, pose, [*parts[0].tolist(), *parts[1].tolist()])
         self._after()
 
-    def _orientation(self, name: str) -> Sequence[float]:
-        """Orientation (4,) of a body's frame now."""
-        placement, bone = self._placed(name)
-        axes = placement.doll.root.pose.relative(Pose()).orientation
-        return rotation.multiply(self.simulation.state.orientations[bone], axes).tolist()
 
-    def _placed(self, name: str) -> tuple[Placement, int]:
-        """A body and its bone."""
-        scene = self.simulation.scene
-        return next((placement, own.start) for placement, own in zip(
-            scene.dolls, scene.bone_slices, strict=True) if placement.name == name)
+def _driven_names(scene: Scene) -> tuple[list[str], list[str]]:
+    """Names of all bodies and robots that are driven, and of the robots."""
+    robots = [robot.name for robot in scene.robots]
+    return [*(each.name for each in scene.dolls
+              if each.follow and each.name not in scene.robot_of_body), *robots], robots
 
 
 def body_topic(name: str) -> str:

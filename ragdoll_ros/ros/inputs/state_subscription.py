@@ -15,6 +15,7 @@ from ...model.vectors import unit_vector
 from ...physics.simulation import Simulation
 from ..parameters.node_settings import NodeSettings
 from .input_counts import InputCounts
+from .joint_values import joint_values
 from .subscriptions import limited
 
 TOPIC = '~/set_state'
@@ -60,14 +61,7 @@ class StateSubscription:
     def _set_joints(self, message: JointState) -> None:
         """Doll by doll; all of the message is checked before any is set."""
         names, scene = list(message.name), self.simulation.scene
-        if len(set(names)) < len(names):
-            raise errors.WrongForm('name', names, 'different names')
-        values = {}
-        for key, numbers in (('joint_angles', message.position), ('joint_rates', message.velocity)):
-            if len(numbers) not in (0, len(names)):
-                raise errors.WrongForm('position' if key == 'joint_angles' else 'velocity',
-                                       len(numbers), f'as many as names, {len(names)}, or none')
-            values[key] = dict(zip(names, numbers, strict=False))
+        values = dict(zip(('joint_angles', 'joint_rates'), joint_values(message), strict=True))
         given = []
         for placement in scene.dolls:
             own = {scene.qualified(placement, name): name

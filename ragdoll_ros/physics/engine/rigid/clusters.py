@@ -218,14 +218,14 @@ class Clusters:
                 cluster.state.v[:] = self.v[cluster.v_indices]
                 cluster.state.dense_step[:] = 0
 
-    def set_twist(self, doll: int, v: np.ndarray) -> None:
-        """Set the velocities of a doll to its own in those of the scene (nv,); the contacts of its
-        cluster are kept.
+    def use_twists(self, dolls: Sequence[int]) -> None:
+        """Let the clusters of ``dolls``, whose ``v`` were set, go on with these; their contacts are
+        kept.
         """
-        self.v[self._v[doll]] = v[self._v[doll]]
-        cluster = self.members[self.of_doll[doll]]
-        cluster.state.v[:] = self.v[cluster.v_indices]
-        cluster.state.dense_step[:] = 0
+        for place in dict.fromkeys(self.of_doll[dolls].tolist()):
+            cluster = self.members[place]
+            cluster.state.v[:] = self.v[cluster.v_indices]
+            cluster.state.dense_step[:] = 0
 
     def set_motion(self, dolls: Sequence[int], q: np.ndarray, v: np.ndarray) -> None:
         """Set the coordinates and velocities of kinematic dolls to their own in those of the scene
@@ -733,7 +733,7 @@ def _each_doll(scene: Scene, like: Clusters | None) -> tuple[list[System], list[
     keys = _keys(scene)
     for key, placement in zip(keys, scene.dolls, strict=True):
         if key not in made:
-            alone = dataclasses.replace(scene, dolls=(placement,), bodies=())
+            alone = dataclasses.replace(scene, dolls=(placement,), bodies=(), robots=())
             made[key] = build_system(alone), contact_laws(alone)
     each = [made[key] for key in keys]
     return [system for system, _ in each], [laws for _, laws in each]

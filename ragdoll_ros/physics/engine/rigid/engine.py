@@ -142,19 +142,25 @@ class RigidEngine:
         self._last_start = None
         clusters.add_work(self.doll_totals.energy - before)
 
-    def set_twist(self, doll: int, velocity: np.ndarray, spin: np.ndarray) -> None:
-        coordinates, layout = self.coordinates, self.layout
-        coordinates.v[layout.root_velocities[doll]] = velocity
-        coordinates.v[layout.root_angular_velocities[doll]] = spin
-        own = self.cluster_of_doll == self.cluster_of_doll[doll]
+    def set_twists(self, dolls: Sequence[int], twists: np.ndarray) -> None:
+        own = self._in_clusters_of(dolls)
         self._wake(own)
-        self._clusters.set_twist(doll, self._in_root_axes(coordinates))
+        axes = rotation.inverse(self._clusters.q[self.layout.root_orientations[dolls]])
+        self._clusters.v[self.layout.root_velocities[dolls]] = twists[:, :3]
+        self._clusters.v[self._spins[dolls]] = rotation.rotate(axes, twists[:, 3:])
+        self._clusters.use_twists(dolls)
         self._clusters.advance(0.0, self.accuracy, ~own)
         self._update_state()
-        self._twisted.append(doll)
+        self._twisted += dolls
+
+    def _in_clusters_of(self, dolls: Sequence[int]) -> np.ndarray:
+        """Which dolls (d,) are in the clusters of some."""
+        named = np.zeros(len(self.cluster_of_doll), bool)
+        named[self.cluster_of_doll[dolls]] = True
+        return named[self.cluster_of_doll]
 
     def set_motion(self, dolls: Sequence[int], coordinates: GeneralizedState) -> None:
-        own = np.isin(self.cluster_of_doll, self.cluster_of_doll[dolls])
+        own = self._in_clusters_of(dolls)
         self._wake(own)
         self._clusters.set_motion(dolls, coordinates.q, self._in_root_axes(coordinates))
         self._clusters.advance(0.0, self.accuracy, ~own)

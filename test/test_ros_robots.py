@@ -1,0 +1,139 @@
+"""Topics of robots of several links: JointState moves the joints, Odometry and Twist the frame."""
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Twist, Vector3
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from test_robot_motion import PLANAR, tip, yaw
+from test_ros_set_state import odometry
+
+from ragdoll_ros import Simulation, load_scene
+from ragdoll_ros.physics.logged_simulation import apply_event, state_digest
+
+SCENE = """ground: {}
+dolls: [{doll: doll, position: [0, 0, 0.05]}]
+bodies:
+  - {name: my arm, urdf: r.urdf, position: [-2, 0, 0.3], follow: exact}
+"""
+TOPIC = '/ragdoll/bodies/my_arm/joint_states'
+
+
+@pytest.fixture
+def node(make_node, tmp_path):
+    (tmp_path / 'r.urdf').write_text(PLANAR)
+    path = tmp_path / 'robot.yaml'
+    path.write_text(SCENE)
+    return make_node(scene=str(path), start_paused=True)
+
+
+def joints(names=('shoulder', 'elbow'), position=(), velocity=()):
+    return JointState(name=list(names), position=list(map(float, position)),
+                      velocity=list(map(float, velocity)))
+
+
+def links(node):
+    """Rows (2, 13) of the two links."""
+    return node.simulation.state.rows[-2:]
+
+
+def test_joint_states_move_an_arm_and_the_events_repeat_it(node, peer):
+    """Real DDS, at the rate of the ticks, with a moving frame; the run is repeated to the bit."""
+    peer.executor_.add_node(node)
+    heard = peer.collect(String, '/ragdoll/events')
+    states = peer.sender(JointState, TOPIC)
+    cmd_vel = peer.sender(Twist, '/ragdoll/bodies/my_arm/cmd_vel')
+
+    def events():
+        told = (json.loads(message.data) for _, message in heard)
+        return [each for each in told if each['kind'] == 'drive_body']
+
+    cmd_vel.publish(Twist(linear=Vector3(x=0.5)))
+    peer.wait(lambda: len(events()) == 1)
+    for tick in range(15):
+        states.publish(joints(position=(0.02 * tick, -0.01 * tick), velocity=(2, -1)))
+        peer.wait(lambda count=tick + 2: len(events()) == count)
+        node.tick()
+    (x, y), turn = tip(0.3, -0.15)
+    upper, lower = links(node)
+    assert upper[:3] == pytest.approx((-2 + 0.5 * 0.15, 0, 0.3), abs=1e-9)
+    assert lower[:3] == pytest.approx((-2 + 0.5 * 0.15 + x, y, 0.3), abs=1e-9)
+    assert (yaw(upper), yaw(lower)) == pytest.approx((0.3, turn), abs=1e-9)
+    assert not node.input_counts.refused and node.simulation.stale_bodies == ()
+    with Simulation(node.simulation.scene) as simulation:
+        for event in events():
+            while simulation.time < event['tick'] * simulation.tick:
+                simulation.advance()
+            apply_event(simulation, 'drive_body', {
+                key: value for key, value in event.items() if key not in (
+                    'number', 'tick', 'kind')})
+        while simulation.time < node.simulation.time:
+            simulation.advance()
+        assert state_digest(simulation.state) == state_digest(node.simulation.state)
+
+
+def test_odometry_is_that_of_the_root_link(node):
+    """A quarter turn about z; then the arm drives forward, which is y of the world."""
+    half = math.sqrt(0.5)
+    node.bodies.on_odometry('my arm', odometry(
+        'base_link', 'odom', (-2, 1, 0.3), (0, 0, half, half)))
+    assert node.simulation.body_pose('my arm') == pytest.approx((-2, 1, 0.3, 0, 0, half, half))
+    node.bodies.on_joint_states('my arm', joints(['shoulder'], velocity=[1.0]))
+    node.bodies.on_cmd_vel('my arm', Twist(linear=Vector3(x=1.0)))
+    for _ in range(10):
+        node.tick()
+    upper, _ = links(node)
+    assert upper[:3] == pytest.approx((-2, 1.1, 0.3), abs=1e-9)
+    assert yaw(upper) == pytest.approx(math.pi / 2 + 0.1, abs=1e-9)
+
+
+@pytest.mark.parametrize('wrong, text', [
+    (joints(position=(0, math.nan)), 'joint_angles.elbow: NotFinite'),
+    (joints(velocity=(math.inf, 0)), 'rates.shoulder: NotFinite'),
+    (joints(['shoulder', 'hip'], (0, 0)), 'joint_angles.hip: UnknownJoint'),
+    (joints(position=[0.0]), 'position: WrongForm'),
+    (joints(['elbow', 'elbow'], (0, 0)), 'name: WrongForm')])
+def test_what_is_wrong_is_refused_and_counted(node, wrong, text):
+    before = links(node).copy()
+    node.bodies.on_joint_states('my arm', wrong)
+    assert node.input_counts.refused == {'~/bodies/my_arm/joint_states': 1}
+    assert text in node.input_counts.last_reason
+    node.tick()
+    assert np.array_equal(links(node), before)
+
+
+def test_a_topic_that_stops_or_jumps_is_reported(node):
+    for rate in (10, 1, 20):
+        for tick in range(20):
+            # 1 kHz, then 100 Hz, then 5 Hz.
+            for _ in range(rate if rate == 10 else tick % rate == 0):
+                node.bodies.on_joint_states('my arm', joints(
+                    position=(0.01 * tick, 0), velocity=(1, 0)))
+            node.tick()
+            assert yaw(links(node)[0]) == pytest.approx(0.01 * (tick + 1), abs=1e-9)
+        # The next round begins 0.2 rad behind, farther than 10 m/s take its tip in a tick: a jump.
+    measures = node.simulation.measures()
+    assert (measures['body_jumps_total'], measures['stale_bodies']) == (2, 1)
+    node.pause(False)
+    node._diagnostics._on_timer()
+    assert 'nothing moves my arm' in node._diagnostics._level_and_message()[1]
+    node.bodies.on_joint_states('my arm', joints(velocity=(1, 0)))
+    node.tick()
+    assert 'nothing moves' not in node._diagnostics._level_and_message()[1]
+    assert not node.input_counts.refused
+
+
+def test_topics_are_those_of_robots_and_not_of_their_links(node):
+    found = {name for name, _ in node.get_subscriber_names_and_types_by_node('ragdoll', '/')
+             if '/bodies/' in name}
+    assert found == {f'/ragdoll/bodies/my_arm/{end}' for end in ('odom', 'cmd_vel', 'joint_states')}
+
+
+def test_the_scene_of_a_run_is_equal(node, tmp_path):
+    from ragdoll_ros.files.run_scene import read_run_scene, run_scene_text
+    read, _ = read_run_scene(run_scene_text(node.simulation.scene))
+    assert read == node.simulation.scene == load_scene(str(tmp_path / 'robot.yaml'))
