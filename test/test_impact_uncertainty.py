@@ -1,4 +1,4 @@
-"""Uncertainties of impacts: they cover the distance to closed forms, and say where none is known."""
+"""Uncertainties of impacts cover the distance to closed forms, and are NaN where none is known."""
 from __future__ import annotations
 
 import dataclasses
@@ -123,7 +123,8 @@ def test_a_fall_that_has_become_another_one_has_no_uncertainty():
     later = [one for one in found.impacts if one.impact.time >= found.apart * 1e9]
     assert any(one.finer for one in before) and later
     for one in found.impacts:
-        assert (one.finer is None) == math.isnan(one.uncertainty.speed)
+        assert one.finer is not None or math.isnan(one.uncertainty.speed)
+        assert not one.uncertainty.speed >= one.impact.speed
     assert all(one.finer is None and math.isnan(one.uncertainty.time) for one in later)
 
 
@@ -164,7 +165,25 @@ def test_the_uncertainty_is_the_factor_times_the_difference():
     assert unsure.peak_force == pytest.approx(FACTOR * 0.1 * math.sqrt(4 * 150e3), rel=1e-4)
     assert unsure.ratio == pytest.approx(unsure.peak_force / 130, rel=1e-9)
     assert unsure.duration == pytest.approx(0, abs=1e-6)
-    assert all(map(math.isnan, dataclasses.astuple(uncertainty_of(hit, None))))
+
+
+def test_a_difference_is_no_less_than_that_of_the_motions():
+    """Both runs have the same figures by chance, 20 um and 0.01 m/s apart."""
+    hit = impact(10, speed=2.0)
+    unsure = uncertainty_of(hit, hit, 2e-5, 0.01)
+    assert unsure.time == pytest.approx(FACTOR * 1e-5, rel=0.01)
+    assert unsure.speed == pytest.approx(FACTOR * 0.01, rel=1e-3)
+    assert unsure.effective_mass == pytest.approx(FACTOR * 4.0 * 2e-4, rel=0.01)
+    assert unsure.impulse == pytest.approx(FACTOR * 8.0 * (0.005 + 2e-4), rel=1e-3)
+    assert unsure.ratio == pytest.approx(FACTOR * hit.ratio * (0.005 + 1e-4), rel=1e-3)
+
+
+def test_what_may_not_happen_and_what_has_no_partner_is_unknown():
+    hit = impact(10, speed=0.1)
+    for finer, velocity in ((None, 0.0), (impact(10, speed=0.11), 0.02),
+                            (impact(10, speed=0.12), 0.0)):
+        unsure = uncertainty_of(hit, finer, 0.0, velocity)
+        assert all(map(math.isnan, dataclasses.astuple(unsure)))
 
 
 @pytest.mark.parametrize('accuracy', ACCURACIES.values())

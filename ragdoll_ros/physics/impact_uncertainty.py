@@ -3,7 +3,8 @@
 A scene runs at its accuracy, and beside it with steps of half the length. Where errors are of order
 p, that of a figure is 2^p / (2^p - 1) times its difference from that of the finer run; a safety
 factor makes an uncertainty of it, as in the grid convergence index of two grids (Roache 1994,
-J Fluids Eng 116:405).
+J Fluids Eng 116:405). A figure may be the same by chance in both runs: its difference counts as no
+less than that which the bones' motions, as the tick begins, make of it.
 """
 from __future__ import annotations
 
@@ -15,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import errors
+from ..model import errors, rotation
 from ..model.biomechanical_limits import BiomechanicalLimits
 from ..model.scene import SECOND, Scene
+from ..model.state import State
 from .accuracy import EXACT, Accuracy, resolve_accuracy
 from .sensors.impacts import Impact
 from .simulation import Simulation
@@ -32,8 +34,13 @@ SAFETY = 3.0
 FACTOR = SAFETY * 2 ** ORDER / (2 ** ORDER - 1)
 """Uncertainty of a figure over its difference from that of the finer run."""
 
-APART = 1e-3
-"""m: the runs have come apart when a bone is farther than this from where the finer run has it."""
+LEVER = 0.1
+"""m: distance at which a turn of a bone moves what it meets, half the breadth of a trunk; and over
+which the effective mass changes by itself."""
+
+APART = 3e-4
+"""m: the runs have come apart when a bone is farther than this from where the finer run has it, by
+distance and LEVER times the angle."""
 
 WINDOW = 0.01
 """s between an impact and its partner in the finer run, at most; at equal times their speeds differ
@@ -56,7 +63,9 @@ Act = Callable[[Simulation], object]
 
 @dataclass(frozen=True)
 class ImpactUncertainty:
-    """Uncertainties of the figures of an impact, in their units, the time's in s; NaN: unknown."""
+    """Uncertainties of the figures of an impact, in their units, the time's in s. NaN: unknown, as
+    the impact has no partner, or its speed is uncertain by all of it, so that it may not happen.
+    """
 
     time: float = math.nan
     speed: float = math.nan
@@ -119,28 +128,30 @@ def impacts_with_uncertainty(
     """
     errors.check_range('duration', duration, scene.step, LONGEST)
     accuracy = resolve_accuracy(accuracy)
-    hits: tuple[list[Impact], list[Impact]] = [], []
+    hits: list[Impact] = []
+    finer: list[Impact] = []
+    deviations: list[tuple[float, float]] = []
     apart = math.inf
     with (Simulation(scene, accuracy=accuracy, engine='rigid') as coarse,
           Simulation(scene, accuracy=halved(accuracy, scene.step), engine='rigid') as fine):
         for simulation in (coarse, fine):
             simulation.record_impacts(limits)
         for _ in range(round(duration / scene.step)):
-            begin = coarse.time / SECOND
-            for simulation, found in zip((coarse, fine), hits, strict=True):
-                if simulation is coarse or apart == math.inf:
-                    if act is not None:
-                        act(simulation)
-                    simulation.advance()
-                    found += simulation.impacts
-            if apart == math.inf and _distance(coarse, fine) > APART:
-                apart = begin
+            begin, deviation = coarse.time / SECOND, Deviation.between(coarse.state, fine.state)
+            hits += _impacts_of_tick(coarse, act)
+            if apart == math.inf:
+                finer += _impacts_of_tick(fine, act)
+                if Deviation.between(coarse.state, fine.state).places.max() > APART:
+                    apart = begin
+                else:
+                    deviations += [deviation.of(scene, hit) for hit in coarse.impacts]
         dropped = coarse.dropped_impacts
-    compared = [hit for hit in hits[0] if hit.time < apart * SECOND]
-    partners = [*partners_of(compared, hits[1]), *[None] * (len(hits[0]) - len(compared))]
-    return UncertainImpacts(tuple(
-        UncertainImpact(hit, partner, uncertainty_of(hit, partner))
-        for hit, partner in zip(hits[0], partners, strict=True)), apart, dropped)
+    partners = partners_of(hits[:len(deviations)], finer)
+    known = [UncertainImpact(hit, partner, uncertainty_of(hit, partner, *deviation))
+             for hit, partner, deviation in zip(hits, partners, deviations, strict=False)]
+    return UncertainImpacts(
+        (*known, *(UncertainImpact(hit, None, ImpactUncertainty()) for hit in hits[len(known):])),
+        apart, dropped)
 
 
 def halved(accuracy: Accuracy, tick: float) -> Accuracy:
@@ -175,20 +186,60 @@ def partners_of(impacts: Sequence[Impact], others: Sequence[Impact]) -> list[Imp
     return partners
 
 
-def uncertainty_of(hit: Impact, finer: Impact | None) -> ImpactUncertainty:
-    """Uncertainties of the figures of an impact by its partner; without one they are unknown."""
+def uncertainty_of(hit: Impact, finer: Impact | None, place: float = 0.0,
+                   velocity: float = 0.0) -> ImpactUncertainty:
+    """Uncertainties of the figures of an impact by its partner; they are unknown without one, and
+    where the speed is not known to be above 0.
+
+    ``place``, m, and ``velocity``, m/s, by which the motions of both runs differ where it meets,
+    are what times and speeds differ by at least, and so what follows from them.
+    """
     if finer is None:
         return ImpactUncertainty()
-    known = {field.name for field in dataclasses.fields(ImpactUncertainty)} - {'time'}
-    return ImpactUncertainty(
-        time=FACTOR * abs(hit.time - finer.time) / SECOND + TOUCHING / hit.speed,
-        **{name: FACTOR * abs(getattr(hit, name) - getattr(finer, name))
-           + ROUNDING * getattr(hit, name) for name in known})
+    turned, faster = place / LEVER, velocity / hit.speed
+    shares = {'speed': faster, 'effective_mass': turned, 'impulse': faster + turned,
+              'peak_force': faster + turned / 2, 'ratio': faster + turned / 2,
+              'duration': turned / 2}
+    found = ImpactUncertainty(
+        time=FACTOR * max(abs(hit.time - finer.time) / SECOND, place / hit.speed)
+        + TOUCHING / hit.speed,
+        **{name: FACTOR * max(abs(getattr(hit, name) - getattr(finer, name)),
+                              share * getattr(hit, name)) + ROUNDING * getattr(hit, name)
+           for name, share in shares.items()})
+    return found if found.speed < hit.speed else ImpactUncertainty()
 
 
-def _distance(a: Simulation, b: Simulation) -> float:
-    """Largest distance, m, of a bone in two simulations of a scene."""
-    return float(np.linalg.norm(a.state.positions - b.state.positions, axis=1).max())
+@dataclass(frozen=True)
+class Deviation:
+    """How far the motions of n bones in two runs of a scene are from each other."""
+
+    places: np.ndarray
+    """(n,) m: distance, and LEVER times the angle."""
+    velocities: np.ndarray
+    """(n,) m/s: the same of velocities."""
+
+    @classmethod
+    def between(cls, a: State, b: State) -> Deviation:
+        """Of two states."""
+        return cls(
+            np.linalg.norm(a.positions - b.positions, axis=1)
+            + LEVER * rotation.angle_between(a.orientations, b.orientations),
+            np.linalg.norm(a.linear_velocities - b.linear_velocities, axis=1)
+            + LEVER * np.linalg.norm(a.angular_velocities - b.angular_velocities, axis=1))
+
+    def of(self, scene: Scene, hit: Impact) -> tuple[float, float]:
+        """The larger ones, m and m/s, of the one or two bones of an impact."""
+        bones = [scene.bone_index(name) for name in (hit.bone, hit.against)
+                 if name in scene.bone_names]
+        return float(self.places[bones].max()), float(self.velocities[bones].max())
+
+
+def _impacts_of_tick(simulation: Simulation, act: Act | None) -> tuple[Impact, ...]:
+    """Act on a simulation, and advance it by a tick."""
+    if act is not None:
+        act(simulation)
+    simulation.advance()
+    return simulation.impacts
 
 
 def _times(impacts: Sequence[Impact], chosen: list[int]) -> np.ndarray:
