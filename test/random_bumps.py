@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import math
 import sys
 import time
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 from random_worlds import deepest_in_bodies
@@ -35,10 +37,11 @@ from ragdoll_ros import (
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.anthropometry import PERCENTILES, SEXES
 from ragdoll_ros.model.pose import Pose
-from ragdoll_ros.model.scene import Material, height
+from ragdoll_ros.model.scene import SECOND, Material, height
 from ragdoll_ros.people.person import standing
 from ragdoll_ros.physics.accuracy import NORMAL
 from ragdoll_ros.physics.impact_uncertainty import partners_of
+from ragdoll_ros.physics.sensors.impacts import Impact
 
 SITUATIONS = ('standing', 'sitting', 'lying', 'wall')
 SPEEDS = 0.2, 3.0
@@ -201,18 +204,25 @@ def deepest(scene: Scene, state) -> tuple[float, str]:
         scene.bones[own], state.positions[own], state.orientations[own], strict=True)]
         for own in scene.bone_slices]
     for name, shape, place, turn in solids[0]:
-        points = place + rotation.rotate(turn, shape.mesh()[0])
+        points = place + rotation.rotate(turn, _points(shape))
         for other, solid, at, turned in (one for doll in solids[1:] for one in doll):
             reach = sum(math.hypot(*each.half_extents) for each in (shape, solid))
             if np.linalg.norm(at - place) > reach:
                 continue
-            theirs = at + rotation.rotate(turned, solid.mesh()[0])
+            theirs = at + rotation.rotate(turned, _points(solid))
             for one, where, axes, others in ((solid, at, turned, points),
                                              (shape, place, turn, theirs)):
                 local = rotation.rotate(rotation.inverse(axes), others - where)
                 depth = float(-one.signed_distance(local).min())
                 found = max(found, (depth, f'{name} in {other}'))
     return found
+
+
+@functools.lru_cache(maxsize=100)
+def _points(shape):
+    """Points (p, 3) m, of a shape's surface: corners, and the middles of its triangles."""
+    corners, triangles = shape.mesh()
+    return np.concatenate([corners, corners[triangles].mean(axis=1)])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -264,10 +274,16 @@ def run(number: int, accuracy: str = 'normal') -> Found:
     return Found(rise / (energy + most), *deep, overlaps, speed)
 
 
-def blows(impacts):
-    """Those of the robot against the person, that the limits give a force."""
-    return [hit for hit in impacts if (hit.doll, hit.against) == ('person', 'robot/robot')
-            and hit.region]
+def blows(impacts: Sequence[Impact]) -> list[Impact]:
+    """Those of the robot against the person, that the limits give a force: of those that are within
+    a pulse of the contact law, which are one blow, the one with the largest force.
+    """
+    met = [hit for hit in impacts if (hit.doll, hit.against) == ('person', 'robot/robot')
+           and hit.region]
+    return [hit for hit in met if not any(
+        other.bone == hit.bone and other.peak_force > hit.peak_force
+        and abs(other.time - hit.time) < SECOND * max(hit.duration, other.duration)
+        for other in met)]
 
 
 def covered(number: int) -> Counter:
@@ -287,8 +303,9 @@ def covered(number: int) -> Counter:
             fine += simulation.impacts
     told = [one for one in found.impacts if one.impact.time / 1e9 < found.apart]
     count: Counter = Counter()
+    told_blows = blows([one.impact for one in found.impacts])
     for one, true in zip(told, partners_of([one.impact for one in told], fine), strict=True):
-        if not blows([one.impact]):
+        if one.impact not in told_blows:
             continue
         count['blows'] += 1
         if not math.isnan(one.uncertainty.speed):
