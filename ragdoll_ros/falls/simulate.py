@@ -1,6 +1,6 @@
 """Simulate a fall from its start and record its frames."""
 import functools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..people import standing
 from ..people.fall_phases import ONSET_DURATION, Phases, find_phases
 from ..physics.guard import Guard
 from ..physics.rigid_body import GroundHeights
+from ..physics.sensors.impacts import Impact
 from ..physics.simulation import Simulation
 from .fall import Fall
 from .recipe import Recipe
@@ -36,6 +37,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     """Simulate the fall that begins at ``start``."""
     scene, frames, limits = start.scene, _Recorder(recipe, start), _limits()
     impacts = WorstImpacts.none_yet(scene, limits)
+    contacts: list[Impact] = []
     # Not 'auto': falls must not depend on which engines are installed.
     with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
         try:
@@ -57,6 +59,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
                 failure = bad.reason if bad else ''
                 if not bad and simulation.impacts:
                     impacts = impacts.after(simulation.impacts, limits)
+                    contacts += _once(simulation.impacts)
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
@@ -65,7 +68,17 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
-                recipe.philox_key, impacts, tuple(recipe.data['feet']))
+                recipe.philox_key, impacts, tuple(contacts), tuple(recipe.data['feet']))
+
+
+def _once(impacts: Sequence[Impact]) -> Iterator[Impact]:
+    """The impacts of a tick without those of the second of two bones that meet, which come after
+    those of the first.
+    """
+    for before, hit in zip((None, *impacts), impacts, strict=False):
+        if before is None or (before.time, before.against, before.bone) != (
+                hit.time, hit.bone, hit.against):
+            yield hit
 
 
 def _events(simulation: Simulation, start: Start) -> list[tuple[int, Callable[[], None]]]:
