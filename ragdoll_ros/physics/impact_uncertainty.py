@@ -38,7 +38,7 @@ LEVER = 0.1
 """m: distance at which a turn of a bone moves what it meets, half the breadth of a trunk; and over
 which the effective mass changes by itself."""
 
-APART = 3e-4
+APART = 1e-3
 """m: the runs have come apart when a bone is farther than this from where the finer run has it, by
 distance and LEVER times the angle."""
 
