@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .model.state import State as State
     from .model.static_body import StaticBody as StaticBody
     from .people.person import person as person
+    from .physics.impact_uncertainty import impacts_with_uncertainty as impacts_with_uncertainty
     from .physics.run_many import run_many as run_many
     from .physics.sensors.head_injury import head_injury_criterion as head_injury_criterion
     from .physics.simulation import Simulation as Simulation
@@ -56,6 +57,7 @@ _MODULES = {
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'StaticBody': 'model.static_body',
     'head_injury_criterion': 'physics.sensors.head_injury',
+    'impacts_with_uncertainty': 'physics.impact_uncertainty',
     'load_animations': 'files.animation', 'load_doll': 'files.doll',
     'load_limits': 'files.limits', 'load_scene': 'files.scene', 'person': 'people.person',
     'run_many': 'physics.run_many', 'save_doll': 'files.doll',

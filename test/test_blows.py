@@ -98,6 +98,8 @@ def test_a_ball_on_a_plate(held, restitution):
     assert hit.normal == pytest.approx((0, 0, 1), abs=1e-9)
     assert (hit.speed, hit.effective_mass) == pytest.approx((3, mu), rel=1e-8)
     assert hit.impulse == pytest.approx((1 + restitution) * mu * 3, rel=1e-6)
+    assert hit.approach_energy == pytest.approx(mu * 9 / 2, rel=1e-8)
+    assert hit.lost_energy == pytest.approx((1 - restitution ** 2) * mu * 9 / 2, rel=1e-6)
     peak, duration, forces, rate = spring_pulse(masses, 3.0)
     assert (hit.peak_force, hit.duration, hit.ratio) == pytest.approx(
         (peak, duration, peak / LIMIT), rel=1e-3)
@@ -294,6 +296,23 @@ def test_a_driven_body_bumps_with_infinite_mass():
     assert hit.against == 'robot/robot'
     assert (hit.speed, hit.effective_mass, hit.impulse) == pytest.approx((1.5, 3, 4.5), rel=1e-6)
     assert hit.peak_acceleration == pytest.approx(1.5 * math.sqrt(STIFFNESS / 3), rel=1e-6)
+
+
+@pytest.mark.parametrize('restitution', [0.0, 0.5])
+def test_the_energy_that_an_impact_takes_is_missing_in_the_simulation(restitution):
+    """A bar that is hit beside its middle, and turns; without friction nothing else takes any."""
+    bar = Placement(box((0.1, 0.1, 0.8), 2.0, 'bar'), 'bar', (0.3, 0, 0.25))
+    thrown = Placement(ball(mass=1.0), 'ball', velocity=(2.0, 0, 0))
+    scene = Scene('beside', (thrown, bar), None, Material(0.0, 0.0, restitution),
+                  gravity=WEIGHTLESS)
+    with Simulation(scene) as simulation:
+        simulation.record_impacts(HARD)
+        lost = []
+        for _ in range(30):
+            simulation.advance()
+            lost += [hit.lost_energy for hit in simulation.impacts if hit.doll == 'ball']
+        missing = 1.0 * 2.0 ** 2 / 2 - simulation.kinetic_energy
+    assert len(lost) == 1 and lost[0] == pytest.approx(missing, rel=1e-6) and missing > 0.1
 
 
 def test_what_rests_slides_or_is_pressed_has_no_impacts():

@@ -51,6 +51,23 @@ def test_the_worst_impact_of_a_head_is_that_of_the_contact_law(tmp_path, restitu
     assert worst.hic15 == pytest.approx(head_injury_criterion(pulse, rate), rel=1e-3)
 
 
+@pytest.mark.parametrize('restitution', [0.0, 0.6])
+def test_each_contact_has_its_energy(tmp_path, restitution):
+    """Bounces of a ball: m g h comes, e^2 of it goes, until it is slower than an impact."""
+    fall, = generate(recipe_of_balls(tmp_path, 'head', restitution), [0])
+    energy, time, speed = MASS * G * HEIGHT, math.sqrt(2 * HEIGHT / G), math.sqrt(2 * G * HEIGHT)
+    count = 0
+    while time < 1.45:
+        hit = fall.contacts[count]
+        assert (hit.bone, hit.against) == ('head', 'ground')
+        assert hit.time * 1e-9 == pytest.approx(time, abs=1e-5)
+        assert hit.approach_energy == pytest.approx(energy, rel=1e-5)
+        assert hit.lost_energy == pytest.approx((1 - restitution ** 2) * energy, rel=1e-5)
+        count, speed, energy = count + 1, speed * restitution, energy * restitution ** 2
+        time += 2 * speed / G if speed else math.inf
+    assert count == (4 if restitution else 1)
+
+
 def test_a_bone_without_a_region_has_no_columns_of_its_own(tmp_path):
     fall, = generate(recipe_of_balls(tmp_path, 'shell', 0.0), [0])
     assert fall.worst_impacts.by_region == {} and fall.worst_impacts.worst is None
@@ -80,5 +97,16 @@ def test_episodes_have_them_as_columns(tmp_path):
     assert row['worst_ratio'] == max(known) == worst.worst.ratio
     place = row['regions'].index(row['worst_region'])
     assert row['worst_peak_force_N'] == row['region_peak_forces_N'][place]
+    assert (row['worst_against'], row['worst_speed_m_s']) == (worst.worst.against,
+                                                              worst.worst.speed)
+    assert row['contact_times_s'] == sorted(row['contact_times_s'])
+    place = row['contact_times_s'].index(worst.worst.time / 1e9)
+    assert row['contact_speeds_m_s'][place] == worst.worst.speed
+    assert {len(row[key]) for key in row if key.startswith('contact_')} == {
+        len(row['contact_bones'])}
+    pairs = list(zip(row['contact_times_s'], row['contact_bones'], row['contact_against'],
+                     strict=True))
+    assert not any((time, against, bone) in pairs for time, bone, against in pairs), 'each once'
+    assert empty['contact_bones'] == []
     assert none.worst is None and empty['worst_region'] is empty['worst_ratio'] is None
     assert set(empty['region_ratios']) == {None}

@@ -8,6 +8,7 @@ import numpy as np
 from ..model import rotation
 from ..model.scene import Scene
 from ..people.fall_phases import Phases, bone_impacts
+from ..physics.sensors.impacts import Impact
 from ..physics.sensors.imu import ImuErrors, ImuMount, imu_samples, sensor_motion
 from ..physics.sensors.response import ImuResponse, ResponseFilter
 from .worst_impacts import WorstImpacts
@@ -53,6 +54,8 @@ class Fall:
     """128-bit key of the random generator (Philox) of the sensor noise."""
     worst_impacts: WorstImpacts = field(default_factory=lambda: WorstImpacts({}))
     """Of each region of the body, by the limits of load_limits()."""
+    contacts: tuple[Impact, ...] = ()
+    """Each impact of a bone, by time, once: of two bones that meet, that of the first."""
     feet: tuple[str, ...] = ()
     """Bones that may touch the ground before the impact."""
     pulses: np.ndarray = field(default_factory=lambda: np.zeros(0))

@@ -1,6 +1,6 @@
 """Simulate a fall from its start and record its frames."""
 import functools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -9,13 +9,14 @@ from ..files.limits import load_limits
 from ..model.biomechanical_limits import BiomechanicalLimits
 from ..model.coordinates import GeneralizedState
 from ..model.errors import RagdollError
+from ..model.scene import Scene
 from ..people import standing
 from ..people.fall_phases import ONSET_DURATION, Phases, find_phases
 from ..people.passive import end_widths
 from ..physics.guard import Guard
 from ..physics.rigid_body import GroundHeights
 from ..physics.sensors.contact_pulse import PulseLaw, PulseLog
-from ..physics.sensors.impacts import bones_that_hit
+from ..physics.sensors.impacts import Impact, bones_that_hit
 from ..physics.sensors.joint_stop import JointStops
 from ..physics.simulation import Simulation
 from .fall import Fall
@@ -39,10 +40,7 @@ def _limits() -> BiomechanicalLimits:
 def simulate(recipe: Recipe, start: Start) -> Fall:
     """Simulate the fall that begins at ``start``."""
     scene, frames, limits = start.scene, _Recorder(recipe, start), _limits()
-    impacts = WorstImpacts.none_yet(scene, limits)
-    samples = (recipe.frames - 1) * recipe.samples_per_frame
-    pulses = PulseLog(PulseLaw(scene, limits), samples, 1 / recipe.rate / recipe.samples_per_frame)
-    stops = JointStops(scene, end_widths(scene.dolls[0].doll))
+    hits = _Hits(recipe, scene, limits)
     # Not 'auto': falls must not depend on which engines are installed.
     with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
         try:
@@ -62,15 +60,8 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
                     events.pop(0)[1]()
                 bad = guard.advance()
                 failure = bad.reason if bad else ''
-                if not bad and simulation.impacts:
-                    impacts = impacts.after(simulation.impacts, limits)
-                    pulses.add(simulation.impacts)
-                for stop in [] if bad else stops.find(
-                        frames.joints, (simulation.joint_angles, simulation.joint_rates),
-                        1 / recipe.rate):
-                    # When within the tick is not known; what else it has is little beside.
-                    for sample in range(recipe.samples_per_frame):
-                        pulses.enter((frames.valid - 1) * recipe.samples_per_frame + sample, *stop)
+                if not bad:
+                    hits.add(simulation, frames)
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
@@ -79,7 +70,45 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
-                recipe.philox_key, impacts, tuple(recipe.data['feet']), pulses.durations)
+                recipe.philox_key, hits.worst, tuple(hits.contacts), tuple(recipe.data['feet']),
+                hits.pulses.durations)
+
+
+class _Hits:
+    """What met in a fall, and how long its impacts and the stops of its joints last."""
+
+    def __init__(self, recipe: Recipe, scene: Scene, limits: BiomechanicalLimits) -> None:
+        self._limits, self._tick, self._per_frame = (limits, 1 / recipe.rate,
+                                                     recipe.samples_per_frame)
+        self._stops = JointStops(scene, end_widths(scene.dolls[0].doll))
+        self.worst = WorstImpacts.none_yet(scene, limits)
+        self.contacts: list[Impact] = []
+        """Each impact once: of two bones that meet, that of the first."""
+        self.pulses = PulseLog(PulseLaw(scene, limits), (recipe.frames - 1) * self._per_frame,
+                               self._tick / self._per_frame)
+
+    def add(self, simulation: Simulation, frames: '_Recorder') -> None:
+        """Add what met in the tick after the last of the frames."""
+        impacts = simulation.impacts
+        if impacts:
+            self.worst = self.worst.after(impacts, self._limits)
+            self.contacts += _once(impacts)
+            self.pulses.add(impacts)
+        joints = simulation.joint_angles, simulation.joint_rates
+        for stop in self._stops.find(frames.joints, joints, self._tick):
+            # When within the tick is not known; what else it has is little beside.
+            for sample in range(self._per_frame):
+                self.pulses.enter((frames.valid - 1) * self._per_frame + sample, *stop)
+
+
+def _once(impacts: Sequence[Impact]) -> Iterator[Impact]:
+    """The impacts of a tick without those of the second of two bones that meet, which come after
+    those of the first.
+    """
+    for before, hit in zip((None, *impacts), impacts, strict=False):
+        if before is None or (before.time, before.against, before.bone) != (
+                hit.time, hit.bone, hit.against):
+            yield hit
 
 
 def _events(simulation: Simulation, start: Start) -> list[tuple[int, Callable[[], None]]]:

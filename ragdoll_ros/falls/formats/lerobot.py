@@ -7,7 +7,8 @@ indices of a shard follow from its number.
 
 Labels in meta/episodes: onset, impact (first contact) and rest are the frames of Phases;
 impact_frames and impact_speeds (m/s downwards) are those of each bone's first contact. Of impacts:
-worst_region, worst_peak_force_N and worst_ratio, hic15, and of each of the regions the largest.
+region, other side, speed, peak force and ratio of the worst, hic15, of each of the regions the
+largest, and of each contact its time, bone, other side, speed and energies.
 """
 import io
 import json
@@ -20,6 +21,7 @@ import pyarrow as pa
 import pyarrow.parquet as parquet
 
 from ...model.errors import WrongForm
+from ...model.scene import SECOND
 from ..fall import SAMPLE_NAMES, Fall, samples_by_frame
 from ..recipe import Recipe
 
@@ -31,6 +33,16 @@ POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 VELOCITY = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz')
 LABELS = ('onset', 'impact', 'rest', 'direction_deg', 'impact_frames', 'impact_speeds', 'hic15',
           'region_peak_forces_N', 'region_ratios')
+
+
+CONTACTS = {
+    'contact_times_s': (lambda hit: hit.time / SECOND, pa.float64()),
+    'contact_bones': (lambda hit: hit.bone, pa.string()),
+    'contact_against': (lambda hit: hit.against, pa.string()),
+    'contact_speeds_m_s': (lambda hit: hit.speed, pa.float64()),
+    'contact_energies_J': (lambda hit: hit.approach_energy, pa.float64()),
+    'contact_losses_J': (lambda hit: hit.lost_energy, pa.float64())}
+"""Columns with a value of each impact of a fall, and their types."""
 
 
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
@@ -181,11 +193,13 @@ def _impacts(fall: Fall) -> dict:
     worst, regions = fall.worst_impacts.worst, fall.worst_impacts.by_region
     hic15 = fall.worst_impacts.hic15
     return {
-        'worst_region': worst and worst.region, 'worst_peak_force_N': worst and worst.peak_force,
+        'worst_region': worst and worst.region, 'worst_against': worst and worst.against,
+        'worst_speed_m_s': worst and worst.speed, 'worst_peak_force_N': worst and worst.peak_force,
         'worst_ratio': worst and worst.ratio, 'hic15': None if np.isnan(hic15) else hic15,
         'regions': list(regions),
         'region_peak_forces_N': [impact and impact.peak_force for impact in regions.values()],
-        'region_ratios': [impact and impact.ratio for impact in regions.values()]}
+        'region_ratios': [impact and impact.ratio for impact in regions.values()],
+        **{name: [value(hit) for hit in fall.contacts] for name, (value, _) in CONTACTS.items()}}
 
 
 def _episode_schema(row: dict) -> pa.Schema:
@@ -196,8 +210,10 @@ def _episode_schema(row: dict) -> pa.Schema:
                   impact_frames=pa.list_(pa.int64()), valid_frames=pa.int64(),
                   worst_region=pa.string(), worst_peak_force_N=pa.float64(),
                   worst_ratio=pa.float64(), hic15=pa.float64(), regions=pa.list_(pa.string()),
+                  worst_against=pa.string(), worst_speed_m_s=pa.float64(),
                   region_peak_forces_N=pa.list_(pa.float64()),
-                  region_ratios=pa.list_(pa.float64()))
+                  region_ratios=pa.list_(pa.float64()),
+                  **{name: pa.list_(kind) for name, (_, kind) in CONTACTS.items()})
     for key in row:
         if key.startswith('stats/'):
             fields[key] = pa.list_(pa.int64() if key.endswith('/count') else pa.float64())

@@ -71,6 +71,19 @@ class Impact:
         return self.peak_force / self.limit
 
     @property
+    def approach_energy(self) -> float:
+        """Kinetic energy of the approach along the normal, J: mu v^2 / 2."""
+        return self.effective_mass * self.speed ** 2 / 2
+
+    @property
+    def lost_energy(self) -> float:
+        """What the impulse takes of it, J: J v - J^2 / (2 mu); of an impact that is alone and has
+        no friction (1 - e^2) mu v^2 / 2 with a restitution e. Negative where other impacts at the
+        same time do work on it.
+        """
+        return self.impulse * self.speed - self.impulse ** 2 / (2 * self.effective_mass)
+
+    @property
     def peak_acceleration(self) -> float:
         """Peak of the acceleration of the bone's centre of mass by the pulse, m/s^2."""
         return self.peak_force * self.mobility
