@@ -29,7 +29,7 @@ from ragdoll_ros.physics.logged_simulation import (
 from ragdoll_ros.physics.simulation import Simulation
 
 QUIET = {'checkpoint', 'advance', 'run', 'measures', 'ledger', 'close', 'swings', 'contacts',
-         'coordinates', 'starts', 'parts', 'trail', 'record_impacts', 'prepare_add',
+         'body_pose', 'coordinates', 'starts', 'parts', 'trail', 'record_impacts', 'prepare_add',
          'prepare_remove', 'add', 'remove'}
 """Public names of Simulation that change nothing, or only by the ticks that are counted, its
 deprecated names, which lead to new ones, and those of which carry_out() is told."""
