@@ -113,20 +113,22 @@ class SleepDetector:
         still and rest on the ground. ``loaded`` bones keep their dolls awake. Not to be called if
         all_move().
         """
-        ready = self._update(engine.state, engine.doll_totals.kinetic, tick)
+        sleeping = engine.sleeping
+        ready = self._update(engine.state, engine.doll_totals.kinetic, sleeping, tick)
         if dolls := self._doll[list(loaded)].tolist():
             self.restart(dolls)
             ready[dolls] = False
         if not np.count_nonzero(ready):
             return ready
         clusters = engine.cluster_of_doll
-        ready |= engine.sleeping
+        ready |= sleeping
         awake = np.bincount(clusters, ~ready) > 0
         supported = np.bincount(clusters, engine.dolls_on_ground()) > 0
-        return (supported & ~awake)[clusters] & ~engine.sleeping
+        return (supported & ~awake)[clusters] & ~sleeping
 
-    def _update(self, state: State, kinetic: np.ndarray, tick: int) -> np.ndarray:
-        """Which dolls (d,) have been still for long enough; ``kinetic`` (d,) J."""
+    def _update(self, state: State, kinetic: np.ndarray, sleeping: np.ndarray,
+                tick: int) -> np.ndarray:
+        """Which dolls (d,) that do not sleep yet have been still for long enough; ``kinetic`` J."""
         slow = kinetic <= self.max_kinetic
         speeds = np.abs(state.rows[:, 7:] * self._lever).max(axis=1)
         slow &= np.maximum.reduceat(speeds, self._first) <= self._speed
@@ -134,8 +136,8 @@ class SleepDetector:
         self._since[begun] = state.rows[begun, :7]
         self._still = np.where(slow, self._still + tick, 0)
         self.restart(~slow)
-        ready = self._still >= self._wait
-        if not ready.any():
+        ready = (self._still >= self._wait) & ~sleeping
+        if not np.count_nonzero(ready):
             return ready
         moved = np.maximum(
             np.abs(state.positions - self._since[:, :3]).max(axis=1),
