@@ -25,8 +25,8 @@ pip install --only-binary :all: --constraint "$folder/versions.txt" PyYAML jsons
 echo 'Building and installing ragdoll_ros'
 # From a copy, since a build leaves its traces; what pip installed is what the tests import.
 rm -rf "$folder/source" && mkdir "$folder/source"
-(cd "$here" && cp -r setup.py setup.cfg pyproject.toml package.xml config resource ragdoll_ros \
-    "$folder/source")
+(cd "$here" && cp -r setup.py setup.cfg pyproject.toml package.xml config launch resource \
+    ragdoll_ros "$folder/source")
 pip install --no-build-isolation --constraint "$folder/versions.txt" \
     "$folder/source[ros,report,fit]" pytest
 "$folder/venv/bin/python" -m pip list |
