@@ -5,12 +5,15 @@ import json
 from pathlib import Path
 
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+import pytest
 
 from ragdoll_ros.files.run_scene import placement_text, run_scene_text, scene_digest
 from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.physics.logged_simulation import LoggedSimulation, state_digest
+
+pytest.importorskip('rosbags', reason='bags are written by rosbags, of the extra replay')
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 STORAGE = {'.mcap': StoragePlugin.MCAP, '.db3': StoragePlugin.SQLITE3}
 
