@@ -231,13 +231,18 @@ def test_events_repeat_it_to_the_bit(tmp_path):
             for reset in range(1 + engine):
                 if reset:
                     simulation.reset()
-                events = iter(log)
-                event = next(events)
-                for rows in runs:
-                    while event and event[0] == simulation.time:
-                        apply_event(simulation, *event[1:])
-                        event = next(events, None)
-                    assert np.array_equal(simulation.advance().rows, rows)
+                assert_repeated(simulation, log, runs)
+
+
+def assert_repeated(simulation, log, runs):
+    """Events ``log`` of (time, ...) give the states of ``runs``, tick by tick, to the bit."""
+    events = iter(log)
+    event = next(events)
+    for rows in runs:
+        while event and event[0] == simulation.time:
+            apply_event(simulation, *event[1:])
+            event = next(events, None)
+        assert np.array_equal(simulation.advance().rows, rows)
 
 
 def test_a_checkpoint_goes_back_to_where_it_was():

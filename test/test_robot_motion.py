@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from test_driven_motion import assert_repeated
 from test_robot_bodies import refusal, scene
 
 from ragdoll_ros import RagdollError, Simulation, load_scene, save_scene
@@ -13,7 +14,7 @@ from ragdoll_ros.files.run_scene import read_run_scene, run_scene_text
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.pose import Pose
 from ragdoll_ros.model.robot import Robot, RobotJoint
-from ragdoll_ros.physics.logged_simulation import LoggedSimulation, apply_event
+from ragdoll_ros.physics.logged_simulation import LoggedSimulation
 
 pytest.importorskip('numba')
 
@@ -271,13 +272,7 @@ def test_events_repeat_it_to_the_bit(tmp_path):
             for start in range(2):
                 if start:
                     simulation.reset()
-                events = iter(log)
-                event = next(events)
-                for rows in runs:
-                    while event and event[0] == simulation.time:
-                        apply_event(simulation, *event[1:])
-                        event = next(events, None)
-                    assert np.array_equal(simulation.advance().rows, rows)
+                assert_repeated(simulation, log, runs)
 
 
 def test_dolls_come_and_go_while_it_moves(tmp_path):
