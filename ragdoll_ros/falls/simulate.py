@@ -1,5 +1,6 @@
 """Simulate a fall from its start and record its frames."""
 import functools
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
@@ -61,8 +62,10 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
                 bad = guard.advance()
                 failure = bad.reason if bad else ''
                 if not bad:
-                    hits.add(simulation, frames)
+                    hits.add(simulation.impacts)
         excess = simulation.energy_excess if frames.valid else np.nan
+    if any(imu.get('contact_pulse') for imu in recipe.imus):
+        hits.add_stops(recipe, scene, frames)
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
         scene, states, touching, recipe.data['feet'], round(ONSET_DURATION * recipe.rate),
@@ -78,27 +81,31 @@ class _Hits:
     """What met in a fall, and how long its impacts and the stops of its joints last."""
 
     def __init__(self, recipe: Recipe, scene: Scene, limits: BiomechanicalLimits) -> None:
-        self._limits, self._tick, self._per_frame = (limits, 1 / recipe.rate,
-                                                     recipe.samples_per_frame)
-        self._stops = JointStops(scene, end_widths(scene.dolls[0].doll))
+        self._limits = limits
         self.worst = WorstImpacts.none_yet(scene, limits)
         self.contacts: list[Impact] = []
         """Each impact once: of two bones that meet, that of the first."""
-        self.pulses = PulseLog(PulseLaw(scene, limits), (recipe.frames - 1) * self._per_frame,
-                               self._tick / self._per_frame)
+        self.pulses = PulseLog(PulseLaw(scene, limits),
+                               (recipe.frames - 1) * recipe.samples_per_frame,
+                               1 / recipe.rate / recipe.samples_per_frame)
 
-    def add(self, simulation: Simulation, frames: '_Recorder') -> None:
-        """Add what met in the tick after the last of the frames."""
-        impacts = simulation.impacts
+    def add(self, impacts: Sequence[Impact]) -> None:
+        """Add the impacts of a tick."""
         if impacts:
             self.worst = self.worst.after(impacts, self._limits)
             self.contacts += _once(impacts)
             self.pulses.add(impacts)
-        joints = simulation.joint_angles, simulation.joint_rates
-        for stop in self._stops.find(frames.joints, joints, self._tick):
-            # When within the tick is not known; what else it has is little beside.
-            for sample in range(self._per_frame):
-                self.pulses.enter((frames.valid - 1) * self._per_frame + sample, *stop)
+
+    def add_stops(self, recipe: Recipe, scene: Scene, frames: '_Recorder') -> None:
+        """Add the stops of joints between successive frames to the pulses."""
+        stops, per_frame = (JointStops(scene, end_widths(scene.dolls[0].doll)),
+                            recipe.samples_per_frame)
+        joints = list(zip(frames.angles, frames.rates, strict=True))[:frames.valid]
+        for at, (before, after) in enumerate(itertools.pairwise(joints)):
+            for stop in stops.find(before, after, 1 / recipe.rate):
+                # When within the tick is not known; what else it has is little beside.
+                for sample in range(per_frame):
+                    self.pulses.enter(at * per_frame + sample, *stop)
 
 
 def _once(impacts: Sequence[Impact]) -> Iterator[Impact]:
@@ -136,11 +143,6 @@ class _Recorder:
         bodies = start.scene.bodies
         self._furniture = [k for k, body in enumerate(bodies) if body.name not in recipe.floor]
         self._floor = {'ground', *recipe.floor}
-
-    @property
-    def joints(self) -> tuple[np.ndarray, np.ndarray]:
-        """Joint angles and rates of the last frame."""
-        return self.angles[self.valid - 1], self.rates[self.valid - 1]
 
     def add(self, simulation: Simulation) -> None:
         """Record the current state as the next frame."""
