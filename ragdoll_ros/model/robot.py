@@ -28,7 +28,8 @@ Row = tuple[float, float, float, float, float, float, float]
 
 @dataclass(frozen=True)
 class RobotJoint:
-    """A joint of a robot. Its value is an angle, rad, right-handed about the axis, or a way, m.
+    """A joint of a robot. Its value is an angle, rad, right-handed about the axis, or a
+    displacement along it, m.
 
     Args:
         name: unique in its robot.

@@ -165,8 +165,8 @@ def halved(accuracy: Accuracy, tick: float) -> Accuracy:
 
 def partners_of(impacts: Sequence[Impact], others: Sequence[Impact]) -> list[Impact | None]:
     """Of each impact the most similar one of ``others`` with the same bone and the same other side,
-    if neither has a more similar one: by time, in WINDOW, and by the logarithm of the speed. The
-    blow and the small ones that follow it at once keep apart. None where that is above 1.
+    if neither has a more similar one: by time, in WINDOW, and by the logarithm of the speed. An
+    impact and the small ones that follow it at once keep apart. None where that is above 1.
     """
     places: dict[tuple[str, str, str], tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
     for side, found in enumerate((impacts, others)):

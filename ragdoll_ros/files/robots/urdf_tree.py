@@ -107,8 +107,8 @@ class UrdfTree:
                 if joint.limits}
 
     def poses(self, values: dict[str, float]) -> dict[str, Pose]:
-        """Pose of every link in the root's frame at joint angles, or ways of prismatic joints (rad
-        or m, by child, default zero).
+        """Pose of every link in the root's frame at joint angles, or displacements of prismatic
+        joints (rad or m, by child, default zero).
         """
         placed: dict[str, Pose] = {}
         for name in self.order:
