@@ -24,8 +24,9 @@ ROS_OWN = re.compile('use_sim_time$|start_type_description_service$|qos_override
 ABSENT = {('/ragdoll/bodies/<name>/odom', 'in', 'nav_msgs/Odometry'),
           ('/ragdoll/bodies/<name>/cmd_vel', 'in', 'geometry_msgs/Twist'),
           ('/ragdoll/bodies/<name>/joint_states', 'in', 'sensor_msgs/JointState'),
+          ('/tf', 'in', 'tf2_msgs/TFMessage'), ('/tf_static', 'in', 'tf2_msgs/TFMessage'),
           *(() if TFMessage else {('/tf', 'out', 'tf2_msgs/TFMessage')})}
-"""What is offered in scenes with driven bodies, and where tf2_msgs is installed."""
+"""What is offered with driven bodies, by `body_frames`, and where tf2_msgs is installed."""
 
 STANDARD = re.compile('simulation_interfaces/|/_action/')
 """What docs/simulation_interfaces.md has."""

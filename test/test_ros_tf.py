@@ -22,6 +22,8 @@ from ragdoll_ros.model.pose import Pose
 
 pytestmark = pytest.mark.slow
 LISTENER = Path(__file__).parent / 'tf_listener.py'
+BROADCASTER = LISTENER.with_name('tf_broadcaster.py')
+HALF = np.sqrt(0.5)
 
 
 @pytest.fixture(scope='module', autouse=True)
@@ -106,3 +108,22 @@ def test_who_comes_while_the_time_stands_hears_the_frames_too(run_node, peer):
     assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True)).success
     first, second = (listen(0)['frames'] for _ in range(2))
     assert first == second and len(first) == 1
+
+
+def test_a_body_follows_a_frame_that_another_process_broadcasts(run_node, tmp_path):
+    path = tmp_path / 'cart.yaml'
+    path.write_text("""ground: {}
+dolls: [{doll: doll, position: [3, 0, 0.05]}]
+bodies: [{name: cart, shape: {box: {size: [0.5, 0.4, 0.3]}}, follow: exact}]
+""")
+    run_node('-p', f'scene:={path}', '-p', "body_frames:=['cart base']")
+    cart = load_scene(str(path)).bone_names.index('cart/cart')
+    done = subprocess.run([sys.executable, str(BROADCASTER), str(cart)], capture_output=True,
+                          text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    rows = np.array(json.loads(done.stdout))
+    assert rows[-1] == pytest.approx((0, 0.5, 1, 0, 0, HALF, HALF), abs=1e-9)
+    heights = rows[:, 2]
+    # It is where the scene has it, then on the frame's line, where it moves on for at most 0.2 s.
+    assert set(np.round(heights, 9)) <= {0.0, 1.0}
+    assert rows[:, 1].min() >= -1e-9 and rows[:, 1].max() <= 0.5 + 0.2 * 0.5

@@ -324,6 +324,13 @@ class Scene:
         return {name: robot.name for robot in self.robots for name in robot.links.values()}
 
     @cached_property
+    def driven_names(self) -> tuple[str, ...]:
+        """Names of the bodies with ``follow`` that are no links, and of the robots."""
+        return (*(each.name for each in self.dolls
+                  if each.follow and each.name not in self.robot_of_body),
+                *(robot.name for robot in self.robots))
+
+    @cached_property
     def bones(self) -> tuple[Bone, ...]:
         """All bones, doll by doll: the order of all arrays."""
         return tuple(bone for placement in self.dolls for bone in placement.doll.bones)

@@ -333,7 +333,7 @@ class RagdollNode(Node):
         self._event_log.set_simulation(simulation, prepared.run_scene)
         self.has_world = True
         self.simulation = self.inputs.simulation = self.states.simulation = simulation
-        self.bodies.set_simulation(simulation)
+        self.bodies.set_simulation(simulation, self.settings)
         self._diagnostics.simulation = simulation
         self.inputs.settings = self.states.settings = self.settings
         self.recovery.set_simulation(simulation)
@@ -398,6 +398,8 @@ class RagdollNode(Node):
             self.simulation.accuracy = settings.accuracy
         if 'impact_limits' in changed:
             self._impacts.configure(settings)
+        if 'body_frames' in changed:
+            self.bodies.configure(settings)
         if changed & IMU_SETTINGS:
             self._imus.configure(self.simulation.scene, settings)
             if self.simulation.samples_per_tick != settings.samples_per_tick:

@@ -15,9 +15,10 @@ from sensor_msgs.msg import JointState
 
 from ...model import errors, rotation
 from ...model.drive import MAX_SPEED
-from ...model.scene import Scene
 from ...model.vectors import unit_vector
 from ...physics.simulation import Simulation
+from ..parameters.node_settings import NodeSettings
+from .body_frames import BodyFrames
 from .input_counts import InputCounts
 from .joint_values import joint_values
 from .subscriptions import limited
@@ -27,7 +28,7 @@ JOINTS = 'joint_states'
 
 class BodySubscriptions:
     """Subscriptions to ~/bodies/<name>/odom and ~/bodies/<name>/cmd_vel, for each driven body and
-    robot, and to ~/bodies/<name>/joint_states, for each robot.
+    robot, to ~/bodies/<name>/joint_states, for each robot, and to /tf, where bodies follow frames.
 
     A pose is that of the body's frame in the world frame, whatever the message calls its frames: a
     robot's odometry has names of its own. Twists are along the body's axes, as nav_msgs and REP 103
@@ -38,14 +39,16 @@ class BodySubscriptions:
     def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None]) -> None:
         self._node, self._counts, self._after = node, counts, after
         self._subscriptions: list[Subscription] = []
-        self._names: tuple[list[str], list[str]] = [], []
+        self._names: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
         """Of all that is driven, and of robots."""
+        self._frames = BodyFrames(node, self._drive_by_frame, counts.refuse)
         self.simulation: Simulation
 
-    def set_simulation(self, simulation: Simulation) -> None:
+    def set_simulation(self, simulation: Simulation, settings: NodeSettings) -> None:
         """Move the bodies of this simulation, and subscribe for those of its scene."""
-        self.simulation = simulation
-        names = _driven_names(simulation.scene)
+        self.simulation, scene = simulation, simulation.scene
+        self.configure(settings)
+        names = scene.driven_names, tuple(robot.name for robot in scene.robots)
         if names == self._names:
             return
         for subscription in self._subscriptions:
@@ -59,6 +62,10 @@ class BodySubscriptions:
                                              (Twist, 'cmd_vel', self.on_cmd_vel, driven),
                                              (JointState, JOINTS, self.on_joint_states, robots))
             for name in own]
+
+    def configure(self, settings: NodeSettings) -> None:
+        """Follow the frames that the settings name."""
+        self._frames.configure(settings.body_frames, self.simulation.scene, settings.frame_id)
 
     def on_odometry(self, name: str, message: Odometry) -> None:
         """Move a body on from a pose; a message that is wrong is refused and counted."""
@@ -90,6 +97,10 @@ class BodySubscriptions:
         else:
             self._after()
 
+    def _drive_by_frame(self, name: str, pose: Sequence[float], twist: Sequence[float]) -> None:
+        self.simulation.drive_body(name, pose, twist)
+        self._after()
+
     def _drive(self, source: str, name: str, pose: Sequence[float] | None,
                orientation: Sequence[float], twist: Twist) -> None:
         """Move a body; ``orientation``: of the axes that the twist is along."""
@@ -98,13 +109,6 @@ class BodySubscriptions:
             for key in ('linear', 'angular')]
         self.simulation.drive_body(name, pose, [*parts[0].tolist(), *parts[1].tolist()])
         self._after()
-
-
-def _driven_names(scene: Scene) -> tuple[list[str], list[str]]:
-    """Names of all bodies and robots that are driven, and of the robots."""
-    robots = [robot.name for robot in scene.robots]
-    return [*(each.name for each in scene.dolls
-              if each.follow and each.name not in scene.robot_of_body), *robots], robots
 
 
 def body_topic(name: str) -> str:

@@ -17,6 +17,7 @@ from ...physics.sensors.response import RANGES, ImuResponse
 from ...physics.simulation import MAX_WORKERS
 from ..imu.imu_parameters import check_imus
 from ..messages.tf import PUBLISH_TF
+from .body_frames import parse_body_frames
 
 
 def _parameter(default: object, description: str, limits: tuple[float, float] | None = None,
@@ -79,6 +80,9 @@ class NodeSettings:
         constraints='a file or the name of a shipped one')
     impact_marker_lifetime: float = _parameter(
         2.0, 'Time for which RViz shows a marker of ~/impacts/markers, s', (0.01, 3600.0))
+    body_frames: tuple[str, ...] = _parameter(
+        ('',), "Frames of /tf that bodies with follow, or robots, are moved by: 'body frame'",
+        constraints='driven bodies of the scene; an empty string is none')
     imus: tuple[str, ...] = _parameter(
         ('',), 'Bones with an inertial sensor, each published on ~/imu/<bone>/data_raw: '
         "'bone', 'bone x y z' (m from its centre of mass, bone frame) or "
@@ -180,6 +184,7 @@ def _wrong_names(settings: NodeSettings, scene: Scene) -> Iterator[errors.Ragdol
 def _wrong_sensors(settings: NodeSettings, scene: Scene) -> Iterator[errors.RagdollError]:
     yield from _raised(lambda: settings.imu_flaws)
     yield from _raised(lambda: check_imus(settings.imus, scene.bone_names))
+    yield from _raised(lambda: parse_body_frames(settings.body_frames, scene))
     samples = settings.imu_rate / settings.rate
     if any(settings.imus) and (samples < 1 - 1e-9 or abs(samples / round(samples) - 1) > 1e-9):
         yield errors.OutOfRange('imu_rate', settings.imu_rate,

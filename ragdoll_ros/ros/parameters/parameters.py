@@ -21,6 +21,7 @@ from ...model.scene import Scene
 from ...model.scene_change import SceneChange
 from ...physics.logged_simulation import LoggedSimulation
 from ..imu.imu_parameters import renamed_imus
+from .body_frames import kept_body_frames
 from .node_settings import BONE_NAMES, SPECS, NodeSettings, check, scene_defaults
 
 DOUBLES = {name for name, field in SPECS.items() if isinstance(field.default, float)}
@@ -92,7 +93,8 @@ class Parameters:
         names, self.scene = change.bone_names, change.after
         named = {'pushed_bone': names.get(self.settings.pushed_bone)
                  or scene_defaults(change.after)['pushed_bone'],
-                 'imus': renamed_imus(self.settings.imus, change)}
+                 'imus': renamed_imus(self.settings.imus, change),
+                 'body_frames': kept_body_frames(self.settings.body_frames, change.after)}
         renamed = [Parameter(name, value=value) for name, value in named.items()
                    if value != getattr(self.settings, name)]
         if renamed:
