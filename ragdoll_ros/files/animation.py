@@ -4,7 +4,10 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from dataclasses import dataclass
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +21,7 @@ from ..model.playback import Playback
 from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement
+from .bvh.doll_motion import read_bvh_motion
 from .gltf.character_motion import read_character_motions
 from .key_track import KEY_TOLERANCE
 
@@ -43,11 +47,15 @@ class BodyMotions(Protocol):
 
 @dataclass(frozen=True, repr=False)
 class Animation:
-    """An animation of the file of a doll's character; ``name`` is as there, and unique."""
+    """An animation of the file of a doll's character, with its unique ``name`` there; or of a .bvh
+    ``file``, whose joints ``bones`` names for bodies.
+    """
 
     name: str
     doll: Ragdoll
     _source: BodyMotions
+    file: str | None = None
+    bones: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f'Animation {self.name!r} of {self.doll.name!r}: {self.duration:g} s'
@@ -103,7 +111,7 @@ class Animation:
         with a spin, angles or rates.
         """
         return dataclasses.replace(placement, animation=Playback(
-            self.name, self.motion, start, speed, loop, limp_at, limp_above))
+            self.name, self.motion, start, speed, loop, limp_at, limp_above, self.file, self.bones))
 
 
 def _coordinates(doll: Ragdoll, times: np.ndarray, motions: dict[str, BoneMotion]
@@ -145,23 +153,34 @@ def placed(placement: Placement, motion: FollowedMotion) -> Placement:
         angles=motion.angles, rates=motion.rates)
 
 
-def load_animations(doll: Ragdoll) -> dict[str, Animation]:
-    """Read the animations of the file of a doll's character.
+def load_animations(doll: Ragdoll, file: str | Path | None = None,
+                    bones: Mapping[str, str] | None = None) -> dict[str, Animation]:
+    """Read the animations of the file of a doll's character, or one of motion capture.
 
     Args:
-        doll: as ragdoll_fit makes it of a .glb, .gltf or .vrm: it has a ``model`` and riders.
+        doll: without ``file`` as ragdoll_fit makes it of a .glb, .gltf or .vrm: it has a ``model``
+            and riders. With ``file`` any doll.
+        file: a .bvh, whose joints have the names of the doll's bodies or riders, or common names of
+            a person's.
+        bones: names of joints of the file by those of bodies, where others are to be taken.
 
     Returns:
-        Animations by their names, in the order of the file.
+        Animations by their names, in the order of the file; of a .bvh one with its file's name.
 
     Raises:
-        WrongForm: for a doll without a character, or a bone whose bind pose has no size.
-        UnknownBone: if the file has not the bones of the doll's riders.
+        WrongForm: for a doll without a character, a bone whose bind pose has no size, or a .bvh
+            none of whose joints is a body's.
+        UnknownBone, UnknownJoint: if the file has not the bones of the doll's riders, or for
+            ``bones``.
         ModelErrors: if the file cannot be read.
 
     Example:
         >>> load_animations(load_doll('character'))
         {}
     """
-    return {name: Animation(name, doll, motion)
-            for name, motion in read_character_motions(doll).items()}
+    if file is None:
+        return {name: Animation(name, doll, motion)
+                for name, motion in read_character_motions(doll).items()}
+    name, chosen = Path(file).stem, dict(bones or {})
+    return {name: Animation(name, doll, read_bvh_motion(doll, file, chosen),
+                            os.path.abspath(file), chosen)}
