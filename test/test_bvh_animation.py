@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import fit_rigs
 import numpy as np
@@ -10,13 +11,24 @@ from animated_rigs import worlds_at
 from bvh_files import ARMS_DOWN, CMU, FRAME_TIME, bvh
 from samples import every_kind, scene_of
 
-from ragdoll_ros import Placement, Scene, Simulation, load_animations, load_doll
+from ragdoll_ros import (
+    Placement,
+    Scene,
+    Simulation,
+    load_animations,
+    load_doll,
+    load_scene,
+    save_scene,
+)
 from ragdoll_ros.files.bvh.doll_motion import read_bvh_motion
+from ragdoll_ros.files.config import config_folder
 from ragdoll_ros.files.gltf.nodes import TO_ROS
+from ragdoll_ros.files.run_scene import read_run_scene, run_scene_text
+from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.errors import RagdollError
+from ragdoll_ros.model.errors import ModelErrors, RagdollError
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.recordings.bvh_file import bvh_text
@@ -298,3 +310,100 @@ def test_a_single_frame_is_a_pose(tmp_path, man):
     assert animation.duration == 0 and animation.at(0.0).velocity == pytest.approx((0, 0, 0))
     assert animation.place(Placement(man), 0.0).rates == {} or not any(
         animation.at(0.0).rates.values())
+
+
+def scene_file(tmp_path, **entry):
+    """A scene in a folder of its own, beside walk.bvh, in which a man walks to the left."""
+    stride = {'LeftUpLeg': swing((1, 0, 0), 0.4), 'RightUpLeg': swing((1, 0, 0), 0.4, math.pi)}
+    (tmp_path / 'captures').mkdir()
+    (tmp_path / 'captures' / 'walk.bvh').write_text(bvh(ARMS_DOWN, stride, lambda time: (
+        20 * time, 17.5, 0), count=101))
+    fields = ', '.join(f'{key}: {value}' for key, value in entry.items())
+    path = tmp_path / 'scene.yaml'
+    path.write_text('ground: {normal: [0, 0, 1], offset: 0}\n'
+                    f'dolls:\n  - {{doll: man, {fields}}}\n')
+    return str(path)
+
+
+def test_a_scene_plays_a_file_until_the_doll_goes_limp(tmp_path, man):
+    pytest.importorskip('numba')
+    scene = load_scene(scene_file(
+        tmp_path, animation='{file: captures/walk.bvh, start: 0.1, loop: true, limp_at: 1}'))
+    playback = scene.dolls[0].animation
+    assert playback.name == 'walk' and playback.file == str(tmp_path / 'captures' / 'walk.bvh')
+    (tmp_path / 'other').mkdir()
+    save_scene(scene, tmp_path / 'other' / 'saved.yaml')
+    text = (tmp_path / 'other' / 'saved.yaml').read_text()
+    assert 'file: ../captures/walk.bvh' in text
+    assert load_scene(str(tmp_path / 'other' / 'saved.yaml')) == scene
+    assert read_run_scene(run_scene_text(scene))[0] == scene
+    with Simulation(scene) as simulation:
+        simulation.run(99)
+        assert simulation.animated == ('man',)
+        walked = simulation.state.positions[0]
+        simulation.run(60)
+        assert simulation.animated == ()
+        fallen = simulation.state.positions[0]
+    # From 0.1 s on, with a loop after 0.83 s.
+    assert walked[1] == pytest.approx(20 * leg(man) / LEG * 1.09, abs=1e-6)
+    assert fallen[2] < walked[2] - 0.1 and fallen[1] > walked[1] + 0.2
+
+
+def test_a_scene_chooses_joints_and_a_name(tmp_path):
+    path = scene_file(tmp_path, animation='{file: captures/walk.bvh, name: stroll, '
+                                          'bones: {left_thigh: LHipJoint}}')
+    scene = load_scene(path)
+    playback = scene.dolls[0].animation
+    assert playback.name == 'stroll' and playback.bones == {'left_thigh': 'LHipJoint'}
+    save_scene(scene, tmp_path / 'saved.yaml')
+    assert load_scene(str(tmp_path / 'saved.yaml')).dolls == scene.dolls
+
+
+def test_a_scene_starts_limp_within_a_file(tmp_path):
+    scene = load_scene(scene_file(tmp_path, animation='{file: captures/walk.bvh, time: 0.5}'))
+    assert scene.dolls[0].animation is None and scene.dolls[0].velocity[1] > 1
+    save_scene(scene, tmp_path / 'saved.yaml')
+    assert load_scene(str(tmp_path / 'saved.yaml')).dolls == scene.dolls
+
+
+@pytest.mark.parametrize(('animation', 'place', 'words'), [
+    ('{file: none.bvh}', 'animation.file', 'expected a .bvh: a path from the scene'),
+    ('{file: scene.yaml}', 'animation.(scene.yaml)', 'a file whose name ends in .bvh'),
+    ('{file: broken.bvh}', 'animation.(broken.bvh).line 1', 'expected a BVH file'),
+    ('{file: captures/walk.bvh, bones: {left_thigh: Knee}}', 'animation.bones.left_thigh',
+     'UnknownJoint: .Knee.; expected one of'),
+    ('{file: captures/walk.bvh, bones: [Knee]}', 'animation.bones', 'expected a mapping'),
+    ('{file: 3}', 'animation.file', 'expected a string'),
+    ('{file: captures/walk.bvh, start: 2}', 'animation.start', 'OutOfRange: 2'),
+    ('{loop: true}', 'animation', 'expected the missing name, or a file'),
+    ('{name: walk, bones: {left_thigh: Knee}}', 'animation.bones', 'expected a file')])
+def test_a_wrong_entry_is_named(tmp_path, animation, place, words):
+    (tmp_path / 'broken.bvh').write_text('secret: 7')
+    with pytest.raises(ModelErrors, match=words) as caught:
+        load_scene(scene_file(tmp_path, animation=animation))
+    assert [error.path for error in caught.value.errors] == [f'dolls[0].{place}']
+    assert 'secret' not in str(caught.value)
+
+
+def test_the_report_says_how_well_a_doll_follows(tmp_path, capsys):
+    """A T-pose of other proportions; and a knee that is bent the wrong way."""
+    walker = config_folder() / 'walker.glb'
+    skeleton = {name: (up, tuple(np.array(offset) / 17)) for name, (up, offset) in CMU.items()}
+    (tmp_path / 'still.bvh').write_text(bvh(skeleton, count=25))
+    bent = {'LeftLeg': lambda time: about((1, 0, 0), -1.0)}
+    (tmp_path / 'bent.bvh').write_text(bvh(skeleton, bent, count=25))
+    files = [str(tmp_path / f'{name}.bvh') for name in ('still', 'bent')]
+    dolls = [str(config_folder() / f'{name}.yaml') for name in ('walker', 'man')]
+    for doll in (str(walker), *dolls):
+        assert fit([doll, '--animation', *files]) == 0
+        lines = [line for line in capsys.readouterr().out.splitlines() if '0.2 s' in line]
+        assert lines[0].startswith('animation still: 0.2 s; followed to within ')
+        # Arms of man reach 85 degrees, knees of the walker are bent by 6: no more than that.
+        assert int(re.search(r'within (\d+) mm', lines[0])[1]) < 60
+        assert int(re.search(r'within (\d+) mm', lines[1])[1]) > 200
+        assert re.search(r'beyond their limits: .*(LowerLeg|knee)', lines[1]), doll
+    assert fit([str(walker), '--animation', str(tmp_path / 'none.bvh')]) == 2
+    assert 'none.bvh: Unreadable' in capsys.readouterr().err
+    (tmp_path / 'other.bvh').write_text(bvh({'a': ('', (0, 0, 0)), 'b': ('a', (0, 1, 0))}))
+    assert fit([dolls[1], '--animation', str(tmp_path / 'other.bvh')]) == 2
+    assert re.search('--animation .*other.bvh.bones: WrongForm', capsys.readouterr().err)

@@ -32,7 +32,15 @@ SAME_AXES = 0.05
 
 SAME_DIRECTION, OTHER_DIRECTION = 1e-4, math.radians(45)
 """rad, below which a limb has the same direction in both poses, as by rounding; and above which the
-last segment of a limb is aligned too: ankle to toes is not ankle to centre of mass."""
+trunk and the last segments are aligned too. Where the joints of these are depends on the skeleton:
+ankle to toes is not ankle to centre of mass."""
+
+TRUNK_ROLES = ('hips', 'spine', 'neck', 'head', 'clavicle')
+
+SAME_SKELETON = 0.02
+"""Of the length of an edge: by how much edges may differ so that places of all joints are followed.
+Else the doll keeps its own proportions, and the distances from where it should be are those of
+joints that do not turn as they should."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,16 +81,22 @@ class _Retargeting:
         """The motion of the bodies through all frames."""
         points, scale, axes = self._fitted()
         to_doll, aligned = rotation.from_matrix(axes), self._alignments(points, axes)
-        worlds, times, tracks = self.file.worlds(self.joints.values()), self.file.times, {}
-        for body, joint in self.joints.items():
-            place, turn = worlds[joint]
+        worlds, times, is_same = self.file.worlds(self.joints.values()), self.file.times, (
+            self._is_same(points))
+        moved: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        for body in (self.doll.root.name, *self._parents):
+            place, turn = worlds[self.joints[body]]
             turn = rotation.multiply(rotation.multiply(to_doll, turn), rotation.multiply(
                 rotation.inverse(to_doll), aligned[body]))
+            place, up = scale * place @ axes.T, self._parents.get(body)
+            if up is not None and not is_same:
+                place = moved[up][1] + rotation.rotate(moved[up][0], np.subtract(
+                    points[body], self.doll.bone(up).position))
             reach = np.subtract(self.doll.bone(body).position, points[body])
-            place = scale * place @ axes.T + rotation.rotate(turn, reach)
-            tracks[body] = (KeyTrack.sampled(times, turn, True),
-                            KeyTrack.sampled(times, place, False))
-        return BvhMotion(float(times[-1]), times, tracks)
+            moved[body] = turn, place + rotation.rotate(turn, reach)
+        return BvhMotion(float(times[-1]), times, {
+            body: (KeyTrack.sampled(times, turn, True), KeyTrack.sampled(times, place, False))
+            for body, (turn, place) in moved.items()})
 
     @functools.cached_property
     def _parents(self) -> dict[str, str]:
@@ -128,11 +142,14 @@ class _Retargeting:
                                     for body in below], axis=0)
         return points, scale, axes
 
+    @functools.cached_property
+    def _roles(self) -> dict[str, str | None]:
+        names = [bone.name for bone in self.doll.bones]
+        return dict(zip(names, doll_roles(self.doll), strict=True))
+
     def _of_legs(self, bodies: list[str]) -> list[str]:
         """The bodies of legs among these, or all if there are none."""
-        roles = dict(zip((bone.name for bone in self.doll.bones), doll_roles(self.doll),
-                         strict=True))
-        return [body for body in bodies if roles[body] in LEG] or bodies
+        return [body for body in bodies if self._roles[body] in LEG] or bodies
 
     def _lengths(self, points: Mapping[str, np.ndarray],
                  bodies: list[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -158,6 +175,11 @@ class _Retargeting:
         ours, theirs = self._lengths(points, self._edges())
         return float(np.sum((ours - self._scale(points) * theirs) ** 2))
 
+    def _is_same(self, points: Mapping[str, np.ndarray]) -> bool:
+        """Whether the edges of the file have the lengths of the doll's."""
+        ours, theirs = self._lengths(points, self._edges())
+        return bool((abs(ours - self._scale(points) * theirs) <= SAME_SKELETON * ours + 1e-9).all())
+
     def _axes(self, points: Mapping[str, np.ndarray]) -> np.ndarray:
         """Rotation matrix from the file's axes: Y up, facing +Z, or what by quarters of a turn
         about the vertical, or from Z up, fits the bind pose better.
@@ -177,8 +199,8 @@ class _Retargeting:
                     axes: np.ndarray) -> dict[str, np.ndarray]:
         """Rotation (4,) of each body from the bind pose to where its limb is as in the rest pose.
 
-        The direction of a limb is that from its joint to the middle of those below. The root has
-        none: it is upright in both.
+        The direction of a limb is that from its joint to the middle of those below. The root is
+        upright in both.
         """
         found = {self.doll.root.name: np.array(rotation.IDENTITY)}
         for body, parent in self._parents.items():
@@ -189,8 +211,9 @@ class _Retargeting:
             else:
                 ours = np.subtract(self.doll.bone(body).position, points[body])
                 theirs = self._end(self.joints[body])
+            is_limb = below and self._roles[body] not in TRUNK_ROLES
             found[body] = _aligned(found[parent], ours, axes @ theirs,
-                                   SAME_DIRECTION if below else OTHER_DIRECTION)
+                                   SAME_DIRECTION if is_limb else OTHER_DIRECTION)
         return found
 
     def _end(self, joint: int) -> np.ndarray:
