@@ -21,6 +21,7 @@ from ragdoll_ros import (
     save_scene,
 )
 from ragdoll_ros.files.bvh.doll_motion import read_bvh_motion
+from ragdoll_ros.files.bvh.joints import joints_of_bodies
 from ragdoll_ros.files.config import config_folder
 from ragdoll_ros.files.gltf.nodes import TO_ROS
 from ragdoll_ros.files.run_scene import read_run_scene, run_scene_text
@@ -28,7 +29,7 @@ from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.errors import ModelErrors, RagdollError
+from ragdoll_ros.model.errors import ModelErrors, OutOfRange, RagdollError
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.recordings.bvh_file import bvh_text
@@ -303,6 +304,53 @@ def test_joints_are_chosen_by_name(tmp_path, man):
 def test_a_file_that_does_not_fit_is_refused(tmp_path, man, skeleton, chosen, words):
     with pytest.raises(RagdollError, match=words):
         loaded(tmp_path, man, bvh(skeleton), bones=chosen)
+
+
+SKELETONS = {  # chains from the root on; a name that was there before continues from there
+    'Mixamo': 'Hips Spine Spine1 Spine2 Neck Head/Spine2 LeftShoulder LeftArm LeftForeArm LeftHand '
+              'LeftHandIndex1/Hips LeftUpLeg LeftLeg LeftFoot LeftToeBase',
+    'SMPL': 'Pelvis L_Hip L_Knee L_Ankle L_Foot/Pelvis Spine1 Spine2 Spine3 Neck Head/'
+            'Spine3 L_Collar L_Shoulder L_Elbow L_Wrist L_Hand',
+    'Biped': 'Bip01 Pelvis Spine Spine1 Neck Head/Neck L_Clavicle L_UpperArm L_Forearm L_Hand/'
+             'Spine L_Thigh L_Calf L_Foot L_Toe0',
+    'Biovision': 'Hips LeftHip LeftKnee LeftAnkle/Hips Chest Neck Head/'
+                 'Chest LeftCollar LeftShoulder LeftElbow LeftWrist',
+    'ASF': 'root lhipjoint lfemur ltibia lfoot ltoes/root lowerback upperback thorax lowerneck '
+           'upperneck head/thorax lclavicle lhumerus lradius lwrist lhand lfingers',
+    'Blender': 'hips spine chest neck head/chest shoulder.L upper_arm.L forearm.L hand.L/'
+               'hips thigh.L shin.L foot.L toe.L'}
+
+DUE = {  # joints of: pelvis, chest, head, left upper arm, forearm, hand, thigh, shin, foot
+    'Mixamo': 'Hips Spine2 Head LeftArm LeftForeArm LeftHand LeftUpLeg LeftLeg LeftFoot',
+    'SMPL': 'Pelvis Spine3 Head L_Shoulder L_Elbow L_Wrist L_Hip L_Knee L_Ankle',
+    'Biped': 'Pelvis Spine1 Head L_UpperArm L_Forearm L_Hand L_Thigh L_Calf L_Foot',
+    'Biovision': 'Hips Chest Head LeftShoulder LeftElbow LeftWrist LeftHip LeftKnee LeftAnkle',
+    'ASF': 'root thorax head lhumerus lradius lwrist lfemur ltibia lfoot',
+    'Blender': 'hips chest head upper_arm.L forearm.L hand.L thigh.L shin.L foot.L'}
+
+
+@pytest.mark.parametrize('kind', SKELETONS)
+@pytest.mark.parametrize('prefix', ['', 'rig:'])
+def test_joints_of_common_skeletons_are_found(man, kind, prefix):
+    names, parents = [], []
+    for chain in SKELETONS[kind].split('/'):
+        up = -1
+        for name in chain.split():
+            if name not in names:
+                names.append(name)
+                parents.append(up)
+            up = names.index(name)
+    found = joints_of_bodies(man, [prefix + name for name in names], parents, {})
+    parts = ('upper_arm', 'forearm', 'hand', 'thigh', 'shin', 'foot')
+    bodies = ('pelvis', 'chest', 'head', *(f'left_{part}' for part in parts))
+    assert [names[found[body]] for body in bodies] == DUE[kind].split()
+
+
+def test_an_edge_of_no_length_is_refused(tmp_path, man):
+    """By which places would be scaled beyond all bounds."""
+    tiny = {name: (up, tuple(1e-30 * np.array(offset))) for name, (up, offset) in CMU.items()}
+    with pytest.raises(OutOfRange, match=r'pelvis: OutOfRange: .*; expected places of at most'):
+        loaded(tmp_path, man, bvh(tiny, places=lambda time: (1, 17, 0)))
 
 
 def test_a_single_frame_is_a_pose(tmp_path, man):

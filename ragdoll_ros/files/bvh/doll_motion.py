@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ...model import rotation
+from ...model import errors, rotation
 from ...model.forward_kinematics import BoneMotion
 from ...model.ragdoll import Ragdoll
 from ..bone_names.names import LEG, doll_roles
 from ..gltf.nodes import TO_ROS
 from ..key_track import KeyTrack
-from .bvh_file import BvhFile, read_bvh
+from .bvh_file import LARGEST, BvhFile, read_bvh
 from .joints import joints_of_bodies
 
 CENTIMETRE = 0.01
@@ -94,6 +94,8 @@ class _Retargeting:
                     points[body], self.doll.bone(up).position))
             reach = np.subtract(self.doll.bone(body).position, points[body])
             moved[body] = turn, place + rotation.rotate(turn, reach)
+            if not (largest := float(np.abs(moved[body][1]).max())) < LARGEST:
+                raise errors.OutOfRange(body, largest, f'places of at most {LARGEST:g} m')
         return BvhMotion(float(times[-1]), times, {
             body: (KeyTrack.sampled(times, turn, True), KeyTrack.sampled(times, place, False))
             for body, (turn, place) in moved.items()})

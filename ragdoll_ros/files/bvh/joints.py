@@ -19,9 +19,6 @@ alone decide."""
 NEXT_ROLE = dict(zip((*ARM[:-1], *LEG[:-1]), (*ARM[1:], *LEG[1:]), strict=True))
 """Role of the next segment of a limb."""
 
-OTHERS = {'head': 'neck', 'hips': 'spine'}
-"""Role that a joint may have in place of the body's."""
-
 
 def joints_of_bodies(doll: Ragdoll, names: Sequence[str], parents: Sequence[int],
                      chosen: Mapping[str, str]) -> dict[str, int]:
@@ -79,7 +76,7 @@ def _by_roles(doll: Ragdoll, names: Sequence[str], parents: Sequence[int]) -> di
             bodies.setdefault((role, side_of(body)), []).append(body)
     found: dict[str, int] = {}
     for (role, side), own in bodies.items():
-        those = joints.get((role, side)) or joints.get((OTHERS.get(role, role), side))
+        those = joints.get((role, side)) or joints.get(('neck' if role == 'head' else role, side))
         if those and role == 'spine':
             # Of a chain, the last body has the last joint, the others between.
             found |= {body: those[-(-(k + 1) * len(those) // len(own)) - 1]
