@@ -172,6 +172,20 @@ def test_limbs_point_where_those_of_a_t_pose_do(tmp_path, man):
         assert turned < 1e-6, body
 
 
+def test_legs_that_are_apart_at_rest_stand_on_flat_feet(tmp_path, man):
+    """As files of the CMU have them: thighs are turned by 20 degrees to stand."""
+    slant, skeleton, turns = math.radians(20), dict(CMU), {}
+    for side, left in (('Left', 1), ('Right', -1)):
+        for part in ('Leg', 'Foot', 'ToeBase'):
+            up, offset = CMU[f'{side}{part}']
+            skeleton[f'{side}{part}'] = up, tuple(about((0, 0, left), slant).apply(offset))
+        turns[f'{side}UpLeg'] = lambda time, left=left: about((0, 0, left), -slant)
+    poses = pose_of(man, loaded(tmp_path, man, bvh(skeleton, turns)))
+    for body in ('left_thigh', 'right_shin', 'left_foot', 'right_foot'):
+        turned = rotation.angle_between(poses[body].orientation, man.bone(body).orientation)
+        assert turned < 1e-6, body
+
+
 def test_two_rest_poses_of_one_motion_move_a_doll_alike(tmp_path, man):
     """Arms that are spread in one and hang in the other."""
     turns = {'Hips': swing((0, 1, 0), 0.5), 'Spine': swing((1, 0, 0), 0.2, 1),
