@@ -10,7 +10,8 @@ import pytest
 from ragdoll_ros.files.gltf import tracks
 from ragdoll_ros.files.gltf.gltf_file import GltfFile
 from ragdoll_ros.files.gltf.nodes import read_nodes
-from ragdoll_ros.files.gltf.tracks import NodeTrack, read_animations
+from ragdoll_ros.files.gltf.tracks import read_animations
+from ragdoll_ros.files.key_track import KeyTrack
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import ModelError
 
@@ -24,7 +25,7 @@ def track(values, kind, is_rotation=False):
     values = np.asarray(values, float)
     if values.ndim == 2:
         values = np.stack([np.zeros_like(values), values, np.zeros_like(values)], axis=1)
-    return NodeTrack(TIMES, values, kind, is_rotation)
+    return KeyTrack(TIMES, values, kind, is_rotation)
 
 
 def slope(made, time, h=1e-4):
@@ -85,7 +86,7 @@ def test_a_step_holds_until_the_next_key():
 
 
 def test_a_track_stands_before_its_first_key_and_after_its_last():
-    made = NodeTrack(TIMES + 1.0, track(RNG.normal(size=(4, 3)), 'LINEAR').values, 'LINEAR', False)
+    made = KeyTrack(TIMES + 1.0, track(RNG.normal(size=(4, 3)), 'LINEAR').values, 'LINEAR', False)
     for time, key in ((0.3, 0), (4.0, 3)):
         value, rate = made.at(time)
         assert value == pytest.approx(made.values[key, 1])
@@ -93,7 +94,7 @@ def test_a_track_stands_before_its_first_key_and_after_its_last():
 
 
 def test_one_key_is_a_pose():
-    made = NodeTrack(np.array([0.4]), np.ones((1, 3, 3)), 'LINEAR', False)
+    made = KeyTrack(np.array([0.4]), np.ones((1, 3, 3)), 'LINEAR', False)
     for time in (0.0, 0.4, 1.0):
         assert made.at(time)[0] == pytest.approx((1, 1, 1))
         assert not made.at(time)[1].any()

@@ -6,9 +6,9 @@ import sys
 import fit_rigs
 import pytest
 
+from ragdoll_ros.files.bone_names.names import roles_of, side_of
+from ragdoll_ros.files.bone_names.vocabulary import read_vocabulary
 from ragdoll_ros.files.config import config_folder
-from ragdoll_ros.fit.roles.names import roles_of, side_of
-from ragdoll_ros.fit.roles.vocabulary import read_vocabulary
 from ragdoll_ros.model import errors
 
 ROLES = {
@@ -91,7 +91,7 @@ def test_a_users_words_are_read_by_the_command(tmp_path):
     folder = tmp_path / 'ragdoll_ros'
     folder.mkdir()
     (folder / 'bone_names.yaml').write_text('roles: {shin: [polpaccio]}\n')
-    code = ("from ragdoll_ros.fit.roles.names import roles_of\n"
+    code = ("from ragdoll_ros.files.bone_names.names import roles_of\n"
             "print(roles_of(('polpaccio_l',), (-1,)))")
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=60,
                           env={**os.environ, 'XDG_CONFIG_HOME': str(tmp_path)}, check=True)

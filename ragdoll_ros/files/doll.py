@@ -112,7 +112,7 @@ def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
     if doll.riders:
         data['riders'] = [_rider_data(rider) for rider in doll.riders]
     if doll.model is not None:
-        data['model'] = doll.model if folder is None else _relative_path(folder, doll.model)
+        data['model'] = doll.model if folder is None else relative_path(folder, doll.model)
     return data
 
 
@@ -122,13 +122,13 @@ def plain_name(name: str, otherwise: str) -> str:
     return text.strip()[:90] or otherwise
 
 
-def _relative_path(folder: Path, model: str) -> str:
-    """Path of a character relative to ``folder``, with slashes."""
+def relative_path(folder: Path, file: str) -> str:
+    """Path of a file relative to ``folder``, with slashes."""
     try:
-        return Path(os.path.relpath(model, folder)).as_posix()
+        return Path(os.path.relpath(file, folder)).as_posix()
     except ValueError:
         # It is on another drive.
-        return model
+        return file
 
 
 def mass_errors(bones: Sequence[Bone]) -> list[ModelError]:

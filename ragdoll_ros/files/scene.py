@@ -1,4 +1,5 @@
 """Scenes as YAML files (config/scene.schema.json): reading with all errors at once, writing."""
+import dataclasses
 import functools
 import math
 import re
@@ -12,17 +13,20 @@ from ..model.errors import (
     ModelErrors,
     OutOfRange,
     UnknownAnimation,
+    Unreadable,
     WrongForm,
     one_of,
 )
 from ..model.per_doll import PerDoll
+from ..model.playback import Playback
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
-from .animation import load_animations, placed
+from .animation import Animation, load_animations, placed
 from .bodies import body_data, build_bodies, follow_data, follow_of
-from .doll import build_doll, doll_data
+from .doll import build_doll, doll_data, relative_path
 from .repeat import repeated
+from .robots.mesh_file import find_file
 from .robots.robot_data import build_robots, robots_data
 from .schema import (
     has_error_under,
@@ -113,7 +117,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
             doll, more = _with_swings(doll, entry, path)
             found += [error.at(where) for error in more]
         if doll is not None and not has_error_under(found, where):
-            placements += try_build(found, where, _copies, doll, entry) or []
+            placements += try_build(found, where, _copies, doll, entry, path.parent) or []
         if len(placements) > MOST_DOLLS:
             found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
             break
@@ -163,8 +167,7 @@ def scene_data(scene: Scene, folder: Path | None = None,
         if placement.follow:
             entry['follow'] = follow_data(placement.follow)
         if placement.animation:
-            played = {key: getattr(placement.animation, key) for key in ('name', *PLAYBACK_KEYS)}
-            entry['animation'] = {key: value for key, value in played.items() if value != math.inf}
+            entry['animation'] = _playback_data(placement.animation, folder)
             del entry['spin']
         data['dolls'].append(entry)
     if scene.bodies:
@@ -177,11 +180,11 @@ def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
     return yaml_text.to_text(scene_data(scene, folder), 'scene', head)
 
 
-def _copies(doll: Ragdoll, entry: dict) -> list[Placement]:
+def _copies(doll: Ragdoll, entry: dict, folder: Path) -> list[Placement]:
     """The doll as an entry of the scene places, repeats and animates it."""
     first = _placement(doll, entry)
     copies = repeated(first, entry['repeat']) if 'repeat' in entry else [first]
-    return _animated(copies, entry) if 'animation' in entry else copies
+    return _animated(copies, entry, folder) if 'animation' in entry else copies
 
 
 def _placement(doll: Ragdoll, entry: dict) -> Placement:
@@ -200,34 +203,60 @@ def _placement(doll: Ragdoll, entry: dict) -> Placement:
         raise type(error)(f'{key}.{angle}', entry[key][angle], error.expected) from None
 
 
-def _animated(copies: list[Placement], entry: dict) -> list[Placement]:
+def _animated(copies: list[Placement], entry: dict, folder: Path) -> list[Placement]:
     """The copies of a doll with its entry's animation, or limp as it has them at its ``time``."""
     for key in ('spin', 'follow', *ANGLE_KEYS.values()):
         if key in entry:
             raise WrongForm(key, entry[key], 'none: the animation has its own')
-    wanted, doll = entry['animation'], copies[0].doll
-    try:
-        animations = load_animations(doll)
-    except ModelErrors as broken:
-        raise broken.errors[0].at(f'animation.({Path(broken.file).name})') from None
-    except ModelError as error:
-        raise error.at('doll') from None
-    name = wanted['name']
-    if name not in animations:
-        known = one_of(list(animations), name) if animations else (
-            f'no animation: {Path(doll.model or "").name} has none')
-        raise UnknownAnimation('animation.name', name, known)
+    wanted = entry['animation']
+    animation = _animation(copies[0].doll, wanted, folder)
     playing = {key: wanted[key] for key in PLAYBACK_KEYS if key in wanted}
     if 'time' in wanted and playing:
         raise WrongForm('animation.time', wanted['time'], 'either time, to start limp, or '
                         + ', '.join(playing))
     try:
         if 'time' in wanted:
-            motion = animations[name].at(wanted['time'])
+            motion = animation.at(wanted['time'])
             return [placed(copy, motion) for copy in copies]
-        return [animations[name].play(copy, **playing) for copy in copies]
+        return [animation.play(copy, **playing) for copy in copies]
     except ModelError as error:
         raise error.at('animation') from None
+
+
+def _animation(doll: Ragdoll, wanted: dict, folder: Path) -> Animation:
+    """The animation that an entry names, of the doll's character or of a ``file``."""
+    file = wanted.get('file')
+    if file is None and 'name' not in wanted:
+        raise WrongForm('animation', ', '.join(wanted), 'the missing name, or a file')
+    if file is None and 'bones' in wanted:
+        raise WrongForm('animation.bones', wanted['bones'], 'a file whose joints they name')
+    path = file and (find_file(file, folder) or find_file(file, config.config_folder()))
+    if file is not None and path is None:
+        raise Unreadable('animation.file', file, 'a .bvh: a path from the scene')
+    try:
+        animations = load_animations(doll, path, wanted.get('bones'))
+    except ModelErrors as broken:
+        raise broken.errors[0].at(f'animation.({Path(broken.file).name})') from None
+    except ModelError as error:
+        raise error.at('animation' if file else 'doll') from None
+    if file is not None:
+        animation, = animations.values()
+        return dataclasses.replace(animation, name=wanted.get('name', animation.name))
+    name = wanted['name']
+    if name not in animations:
+        known = one_of(list(animations), name) if animations else (
+            f'no animation: {Path(doll.model or "").name} has none')
+        raise UnknownAnimation('animation.name', name, known)
+    return animations[name]
+
+
+def _playback_data(playback: Playback, folder: Path | None) -> dict:
+    """What plays a doll's animation, as its entry has it."""
+    keys = ('name', *PLAYBACK_KEYS)
+    data = {key: value for key in keys if (value := getattr(playback, key)) != math.inf}
+    if playback.file is not None:
+        data['file'] = playback.file if folder is None else relative_path(folder, playback.file)
+    return data | ({'bones': dict(playback.bones)} if playback.bones else {})
 
 
 def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:

@@ -14,7 +14,7 @@ from ..model.scene import Placement, all_above_ground
 from .judging.verdict import Verdict, judge
 from .pipeline import Fit, FitOptions, fit_characters
 from .reading.character import read_character
-from .report import animations_report, doll_report, fit_report
+from .report import animations_report, captures_report, doll_report, fit_report
 from .robots.robot import read_urdf
 
 EPILOG = """\
@@ -87,6 +87,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--keep', nargs='+', action='extend', default=[], metavar='BONE',
                         help='bones that become bodies whatever their size: names as in the '
                         "report, or patterns such as '*Thumb*'")
+    parser.add_argument('--animation', nargs='+', action='extend', default=[], metavar='MOVE.bvh',
+                        help='report how well the doll can follow this motion capture too, by '
+                        'which a scene can move it')
     parser.add_argument('--strict', action='store_true',
                         help='exit with code 3 unless the verdict is good')
     return parser
@@ -95,6 +98,8 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> list[Verdict]:
     path = Path(options.input)
     made = _make_dolls(options, path)
+    made = [(each, fit, '\n'.join([text, *captures_report(each.doll, options.animation)]))
+            for each, fit, text in made]
     verdicts = [judge(each.doll, fit, measured=path.suffix.lower() in ROBOT_SUFFIXES)
                 for each, fit, _ in made]
     report = '\n\n'.join(f'{text}\n{verdict}'

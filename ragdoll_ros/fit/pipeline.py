@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..files.bone_names.names import roles_of
 from ..model import errors, rotation
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll, SkeletonFrame
@@ -23,7 +24,6 @@ from .joints.make_joint import make_joint, with_damping
 from .reading.character import Character
 from .reading.spring_bones import SpringBone, drop_short_segments
 from .reading.spring_to_swing import swing_from_spring
-from .roles.names import roles_of
 from .shapes.axes import Axes, fit_axes
 from .shapes.fitting import DECIMALS, TOLERANCE, FittedShape, fit_best, fit_shape
 from .skeleton.forced_bodies import find_forced_bodies

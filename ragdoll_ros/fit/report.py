@@ -3,12 +3,13 @@
 See judging/verdict.py for the verdict.
 """
 import textwrap
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..files.animation import Animation, load_animations
 from ..model.compound import Compound
-from ..model.errors import RagdollError
+from ..model.errors import ModelError, RagdollError
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
 from .bodies.overlap import colliding_overlaps, covered, overlap_share
@@ -54,6 +55,20 @@ def animations_report(doll: Ragdoll) -> list[str]:
     return [*map(_animation, animations[:COMPARED_ANIMATIONS]), *textwrap.wrap(
         f'animations that were not compared: {rest}' if rest else '', 97,
         subsequent_indent='  ', break_long_words=False)]
+
+
+def captures_report(doll: Ragdoll, files: Sequence[str]) -> list[str]:
+    """A line for each file of motion capture: how well the doll can follow it.
+
+    Raises ModelErrors or a ModelError for a file that is broken or does not fit.
+    """
+    lines = []
+    for file in files:
+        try:
+            lines += map(_followed, load_animations(doll, file).values())
+        except ModelError as error:
+            raise error.at(f'--animation {file}') from None
+    return lines
 
 
 def _animation(animation: Animation) -> str:

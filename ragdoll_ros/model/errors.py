@@ -90,7 +90,7 @@ class NotPrincipal(ModelError):
 
 
 class UnknownJoint(ModelError):
-    """No joint angle has the name."""
+    """No joint angle, or joint of a file, has the name."""
 
 
 class UnknownBone(ModelError):

@@ -2,7 +2,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -33,6 +34,8 @@ class Playback:
         limp_at: s, when the doll goes limp; infinity: only when it is told to.
         limp_above: N: it goes limp when a push, a drive or a hand on it is stronger; infinity: none
             does that.
+        file: absolute path of the .bvh that the animation is of; None: of the doll's character.
+        bones: names of joints of that file by those of bodies, where they were chosen.
 
     Raises:
         OutOfRange, NotFinite: for a number that is out of its range, or a loop below 0.02 s.
@@ -45,6 +48,8 @@ class Playback:
     loop: bool = False
     limp_at: float = math.inf
     limp_above: float = math.inf
+    file: str | None = None
+    bones: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         errors.check_range('start', self.start, 0.0, self.motion.duration)

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
+from ...files.bone_names.names import side_of
 from ...model import rotation
 from ...model.ragdoll import Bone, Joint
 from ..reading.character import Character
-from ..roles.names import side_of
 from ..roles.person import is_person
 from ..shapes.fitting import DECIMALS
 from ..skeleton.groups import BodyGroup

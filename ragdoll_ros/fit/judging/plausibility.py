@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...files.bone_names.names import doll_roles
 from ...model import rotation
 from ...model.ragdoll import Joint, Ragdoll, joint_axes
 from ..reading.scale import MAX_EXTENT, MIN_EXTENT
-from ..roles.names import doll_roles
 from ..roles.person import SEGMENTS, is_person, segment
 from .finding import Finding
 

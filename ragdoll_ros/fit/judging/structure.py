@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...files.bone_names.names import side_of
 from ...model.ragdoll import Joint, Limits, Ragdoll, joint_axes
 from ..bodies.overlap import penetration_depth
-from ..roles.names import side_of
 from .finding import Finding
 
 MIRROR_DISTANCE, NAMED_MIRROR_DISTANCE = 0.03, 0.15

@@ -3,9 +3,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...files.bone_names.names import doll_roles
 from ...model.ragdoll import Ragdoll
 from ..pipeline import Fit
-from ..roles.names import doll_roles
 from ..roles.person import is_person
 from .coverage import find_uncovered
 from .drop_test import run_drop_test

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...files.bone_names.names import side_of
 from ...files.gltf.bones import names_of_nodes, unique_names
 from ...files.gltf.gltf_file import GltfFile
 from ...files.gltf.nodes import TO_ROS, Nodes, read_nodes
 from ...model import errors, rotation
 from ...model.skeleton import Appearance
-from ..roles.names import side_of
 from .draco import decompress
 from .materials import Materials
 from .rigid_meshes import add_rigid_meshes

@@ -5,8 +5,8 @@ estimate uses a person's height, else that no animal is longer than MAX_EXTENT.
 """
 import numpy as np
 
+from ...files.bone_names.names import roles_of
 from ...model import errors
-from ..roles.names import roles_of
 from ..roles.person import is_person
 
 UNITS = {0.01: 'centimetres', 0.001: 'millimetres', 0.0254: 'inches', 0.3048: 'feet',

@@ -1,1 +1,1 @@
-"""Anatomical roles of bones by name, and whether a skeleton is a person's."""
+"""Whether a skeleton is a person's."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...files.bone_names.names import side_of
 from ...model.anthropometry import MEN, TRUNK
-from .names import side_of
 
 SEGMENTS = {'head': MEN.segments['head'].mass,
             'trunk': sum(MEN.segments[part].mass for part in TRUNK),

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...files.bone_names.names import SINGLE_ROLES, side_of
 from ..reading.character import Character
-from ..roles.names import SINGLE_ROLES, side_of
 from ..shapes.axes import principal_components
 from .skin_forest import MIRROR_TOLERANCE
 from .skin_tree import SkinTree

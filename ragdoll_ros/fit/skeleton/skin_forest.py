@@ -5,8 +5,8 @@ nearest.
 """
 import numpy as np
 
+from ...files.bone_names.names import SINGLE_ROLES
 from ..reading.character import Character
-from ..roles.names import SINGLE_ROLES
 from .skin_adjacency import cluster_distances, find_adjacency
 
 MIN_FILE_AREA = 0.1

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...files.bone_names.names import side_of
 from ..reading.character import Character
-from ..roles.names import side_of
 from .skin_adjacency import nearest_midpoint
 from .skin_forest import SkinForest
 

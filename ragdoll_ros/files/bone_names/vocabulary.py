@@ -4,9 +4,9 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...files import yaml_text
-from ...files.config import config_folder
 from ...model import errors
+from .. import yaml_text
+from ..config import config_folder
 
 FILE = 'bone_names.yaml'
 

@@ -1,0 +1,1 @@
+"""Anatomical roles of bones by name: of characters, dolls and motion capture."""

@@ -1,0 +1,1 @@
+"""BVH files of motion capture: the skeleton, the joints of a doll's bodies, the doll's motion."""
