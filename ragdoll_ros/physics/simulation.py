@@ -480,6 +480,13 @@ class Simulation:
         """Names of the dolls that their animations move."""
         return tuple(self.scene.dolls[doll].name for doll in self._animations.dolls)
 
+    @property
+    def powered(self) -> tuple[str, ...]:
+        """Names of the dolls that their animations, or springs on their joints, move."""
+        bones = {spring.bone for spring in self._joint_springs.springs(self.time)}
+        dolls = {*self._animations.dolls, *self.scene.doll_of_bone[list(bones)].tolist()}
+        return tuple(self.scene.dolls[doll].name for doll in sorted(dolls))
+
     def go_limp(self, angles: str | Sequence[str] | None = None) -> None:
         """Let a doll go limp: end its animation, from which it falls with the pose and velocities
         of this instant, and remove the springs of its joint angles.
