@@ -29,6 +29,7 @@ SIZE = 240, 150
 
 SCENES = {'drop': (0.42, 0.7, 1), 'man_faints': (0.75, 0.7, 1), 'woman_faints': (0.75, 0.7, 1),
           'character_falls': (0.45, 0.8, 1), 'walker_faints': (2.35, 0.95, 1),
+          'walker_stumbles': (1.0, 0.95, 1),
           'ponytail': (0.42, 0.6, 1), 'article': (0.6, 0.6, 1), 'flight': (0.0, 0.7, 1),
           'crowd': (0.9, 0.6, 1), 'pile': (0.6, 0.6, 16), 'field': (0.4, 0.3, 1000),
           'stairs': (1.1, 0.8, 1), 'table': (0.6, 0.8, 1), 'bathroom': (0.8, 0.9, 1),
@@ -37,7 +38,8 @@ SCENES = {'drop': (0.42, 0.7, 1), 'man_faints': (0.75, 0.7, 1), 'woman_faints': 
 """Instant of the picture, s; distance of the camera, relative to the home view; and how many
 processors can share a tick: its separate clusters."""
 
-TURNS = {'ponytail': 130.0, 'robot': -60.0, 'walker_faints': -40.0}
+TURNS = {'ponytail': 130.0, 'robot': -60.0, 'walker_faints': -40.0,
+         'walker_stumbles': -40.0}
 """Degrees about the vertical by which the camera is turned from the home view, to see the hair,
 the blow, or the stride.
 """

@@ -1,6 +1,7 @@
-"""Draw docs/walker_faints.png with the page: the walker of config/, from its stride to the fall.
+"""Draw docs/walker_faints.png and docs/walker_stumbles.png with the page: the walker of config/,
+from its stride to the fall.
 
-python docs/walker_picture.py [picture.png]
+python docs/walker_picture.py [SCENE ...]
 """
 from __future__ import annotations
 
@@ -19,9 +20,9 @@ from ragdoll_ros.files.scene import load_scene  # noqa: E402
 from ragdoll_ros.viewer.page import Page  # noqa: E402
 from ragdoll_ros.viewer.sources.simulation import SimulationSource  # noqa: E402
 
-NAME = 'walker_faints'
-INSTANTS = (1.25, 1.5, 1.75, 2.0, 2.2, 2.4, 2.7, 3.5)
-"""s; it goes limp at 2 s."""
+INSTANTS = {'walker_faints': (1.25, 1.5, 1.75, 2.0, 2.2, 2.4, 2.7, 3.5),
+            'walker_stumbles': (0.0, 0.3, 0.6, 0.9, 1.2, 1.4, 1.6, 2.2)}
+"""s, by scene."""
 SIZE = 240, 330
 """Pixels of each part, which is drawn twice as large."""
 EYE, LOOK_AT = np.array((0.9, -4.1, 1.2)), np.array((0.0, 0.0, 0.85))
@@ -42,29 +43,30 @@ def part(page: Page, x: float, label: str) -> Image.Image:
     return drawn
 
 
-def main(path: Path) -> None:
-    """Write the picture."""
-    browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
-    scene, source = load_scene(NAME), SimulationSource(load_scene(NAME))
+def draw(name: str) -> None:
+    """Write the picture of a scene."""
+    scene, source = load_scene(name), SimulationSource(load_scene(name))
     source.pause(True)
     parts, ticks = [], 0
     with browser.chromium(draws=True) as context, served(source) as page:
         view = browser.View(context, f'http://127.0.0.1:{page.server.get_port()}')
         view.wait(lambda: page.frame and page.stage.skins.handles)
         view.page.wait_for_timeout(3000)
-        for instant in INSTANTS:
+        for instant in INSTANTS[name]:
             for _ in range(round(instant / scene.step) - ticks):
                 source.step()
             ticks = round(instant / scene.step)
             view.wait(lambda end=instant: page.frame.time >= end - 1e-9)
             view.page.wait_for_timeout(500)
-            parts.append(part(page, min(instant, 2.4), f'{instant:g} s'))
+            parts.append(part(page, float(page.frame.state.positions[0, 0]), f'{instant:g} s'))
         view.close()
     whole = Image.new('RGB', (SIZE[0] * len(parts), SIZE[1]), 'white')
     for index, each in enumerate(parts):
         whole.paste(each, (SIZE[0] * index, 0))
-    whole.quantize(128).save(path, optimize=True)
+    whole.quantize(128).save(ROOT / f'docs/{name}.png', optimize=True)
 
 
 if __name__ == '__main__':
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / f'docs/{NAME}.png')
+    browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
+    for scene_name in sys.argv[1:] or INSTANTS:
+        draw(scene_name)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .model.mesh import HeightField as HeightField
     from .model.mesh import Hull as Hull
     from .model.mesh import Mesh as Mesh
+    from .model.motors import Motors as Motors
     from .model.plane import Plane as Plane
     from .model.push import Push as Push
     from .model.ragdoll import Bone as Bone
@@ -50,6 +51,7 @@ _MODULES = {
     'Compound': 'model.compound', 'Cylinder': 'model.shapes', 'Drive': 'model.drive',
     'Follow': 'model.follow', 'Ground': 'model.scene', 'HeightField': 'model.mesh',
     'Hull': 'model.mesh', 'Joint': 'model.ragdoll', 'Mesh': 'model.mesh',
+    'Motors': 'model.motors',
     'Part': 'model.shapes', 'Placement': 'model.scene', 'Plane': 'model.plane',
     'Push': 'model.push',
     'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',

@@ -13,7 +13,7 @@ from test_ros_set_state import odometry
 
 from ragdoll_ros.files.run_scene import run_scene_text
 from ragdoll_ros.physics.logged_simulation import state_digest
-from ragdoll_ros.ros.inputs.body_subscriptions import body_topic
+from ragdoll_ros.ros.inputs.bodies.body_subscriptions import body_topic
 
 HALF = math.sqrt(0.5)
 SCENE = """ground: {}

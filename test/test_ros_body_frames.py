@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors, rotation
-from ragdoll_ros.ros.inputs.body_frames import TF, FrameFollower
+from ragdoll_ros.ros.inputs.bodies.body_frames import TF, FrameFollower
 from ragdoll_ros.ros.parameters.body_frames import kept_body_frames, parse_body_frames
 
 SCENE = """ground: {}

@@ -22,6 +22,7 @@ from ragdoll_ros import (
     Hull,
     Joint,
     Mesh,
+    Motors,
     Part,
     Placement,
     Plane,
@@ -75,6 +76,8 @@ def fall(scene: Scene, folder: Path) -> State:
     with Simulation(scene, accuracy='normal', engine='auto', workers=1) as simulation:
         simulation.push(Push(scene.bone_names[0], force=(100.0, 0.0, 0.0)))
         print(Follow(500.0, 50.0).is_exact, simulation.stale_bodies)
+        print(Motors(frequency=4.0).of(scene.dolls[0].doll), simulation.powered)
+        simulation.set_strength(0.5, [scene.angle_names[0]])
         simulation.push(Drive(scene.bone_names[0], velocity=(1.0, 0.0, 0.0)), channel='drive')
         simulation.grab('hand', scene.bone_names[0], (0.0, 0.0, 0.0))
         simulation.let_go('hand')

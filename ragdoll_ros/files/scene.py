@@ -3,7 +3,7 @@ import dataclasses
 import functools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from ..model.errors import (
     WrongForm,
     one_of,
 )
+from ..model.motors import Motors
 from ..model.per_doll import PerDoll
 from ..model.playback import Playback
 from ..model.ragdoll import Ragdoll
@@ -166,6 +167,8 @@ def scene_data(scene: Scene, folder: Path | None = None,
                               for angle, value in values.items()}
         if placement.follow:
             entry['follow'] = follow_data(placement.follow)
+        if placement.motors:
+            entry['motors'] = _motors_data(placement.motors)
         if placement.animation:
             entry['animation'] = _playback_data(placement.animation, folder)
             del entry['spin']
@@ -194,13 +197,28 @@ def _placement(doll: Ragdoll, entry: dict) -> Placement:
     for name, key in ANGLE_KEYS.items():
         fields[name] = {angle: math.radians(value) for angle, value in entry.get(key, {}).items()}
     try:
-        return Placement(doll, follow=follow_of(entry), **fields)
+        return Placement(doll, follow=follow_of(entry), motors=_motors(entry), **fields)
     except ModelError as error:
         name, _, angle = error.path.partition('.')
         if name not in ANGLE_KEYS:
             raise
         key = ANGLE_KEYS[name]
         raise type(error)(f'{key}.{angle}', entry[key][angle], error.expected) from None
+
+
+def _motors(entry: dict) -> Motors | None:
+    """``motors`` of an entry; errors have their place in it."""
+    try:
+        return Motors(**entry['motors']) if 'motors' in entry else None
+    except ModelError as error:
+        raise error.at('motors') from None
+
+
+def _motors_data(motors: Motors) -> dict:
+    """``motors`` in the form of scene.schema.json, without what is infinite."""
+    values = {key: dict(value) if isinstance(value, Mapping) else value
+              for key, value in vars(motors).items()}
+    return {key: value for key, value in values.items() if value != math.inf}
 
 
 def _animated(copies: list[Placement], entry: dict, folder: Path) -> list[Placement]:

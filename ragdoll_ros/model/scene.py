@@ -15,6 +15,7 @@ from . import errors, rotation
 from .errors import set_fields
 from .follow import Follow
 from .forward_kinematics import BoneMotion, bone_motions
+from .motors import Motors
 from .playback import Playback
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
@@ -113,6 +114,8 @@ class Placement:
         animation: what moves the doll until it goes limp, see Animation.play(). Position,
             orientation and velocity are then those of the animation's frame; spin, angles and rates
             are its own.
+        motors: what drives the joints to the initial pose, or, beside an animation, to its poses,
+            while the root is free; None: nothing.
 
     Raises:
         NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none; for ``follow`` of a
@@ -135,6 +138,7 @@ class Placement:
     rates: Mapping[str, float] = field(default_factory=dict, hash=False)
     follow: Follow | None = None
     animation: Playback | None = field(default=None, hash=False)
+    motors: Motors | None = None
 
     def __post_init__(self) -> None:
         for key in ('position', 'velocity', 'spin'):
@@ -151,6 +155,16 @@ class Placement:
                                        'until drive_body() moves it')
         if self.animation is not None:
             self._check_animation(self.animation)
+        if self.motors is not None:
+            try:
+                self.motors.of(self.doll)
+            except errors.ModelError as error:
+                raise error.at('motors') from None
+
+    @property
+    def is_animated(self) -> bool:
+        """Whether an animation moves it as it says, whatever acts on it, until it goes limp."""
+        return self.animation is not None and self.motors is None
 
     @property
     def is_kinematic(self) -> bool:

@@ -7,6 +7,7 @@ part of the log format: they do not change with the names in the code.
 """
 import dataclasses
 import hashlib
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -87,11 +88,27 @@ class LoggedSimulation(Simulation):
         self.on_event('let_go', {'hand': hand})
 
     def hold(self, angle: str, stiffness: float, damping: float = 0.0,
-             target: float | None = None) -> None:
-        super().hold(angle, stiffness, damping, target)
+             target: float | None = None, max_torque: float = math.inf) -> None:
+        super().hold(angle, stiffness, damping, target, max_torque)
         self.on_event('hold', {'angle': angle, 'stiffness': float(stiffness),
                                'damping': float(damping),
-                               'target': None if target is None else float(target)})
+                               'target': None if target is None else float(target),
+                               **({} if math.isinf(max_torque)
+                                  else {'max_torque': float(max_torque)})})
+
+    def set_pose_target(self, joint_angles: Mapping[str, float] | None = None,
+                        rates: Mapping[str, float] | None = None) -> None:
+        super().set_pose_target(joint_angles, rates)
+        given = {'joint_angles': joint_angles, 'rates': rates}
+        self.on_event('set_pose_target', {
+            key: {name: float(value) for name, value in values.items()}
+            for key, values in given.items() if values})
+
+    def set_strength(self, strength: float, names: str | Sequence[str] | None = None) -> None:
+        super().set_strength(strength, names)
+        self.on_event('set_strength', {
+            'strength': float(strength),
+            'names': names if names is None or isinstance(names, str) else list(names)})
 
     def go_limp(self, angles: str | Sequence[str] | None = None) -> None:
         super().go_limp(angles)
@@ -191,8 +208,8 @@ _ACTIONS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: _call_of(name) for name in (
-        'release', 'grab', 'drag', 'let_go', 'hold', 'go_limp', 'set_state', 'drive_body', 'add',
-        'remove')},
+        'release', 'grab', 'drag', 'let_go', 'hold', 'set_pose_target', 'set_strength', 'go_limp',
+        'set_state', 'drive_body', 'add', 'remove')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),
     'parts': lambda simulation, parts: setattr(simulation, 'samples_per_tick', parts),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),

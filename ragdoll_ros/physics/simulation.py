@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -225,8 +226,8 @@ class Simulation:
 
     @property
     def holds(self) -> tuple[JointSpring, ...]:
-        """Active joint springs."""
-        return self._joint_springs.joint_springs
+        """Joint springs, those of motors included."""
+        return self._joint_springs.joint_springs(self.time)
 
     @property
     def contacts(self) -> Contacts:
@@ -413,7 +414,7 @@ class Simulation:
         self._hands.let_go(hand)
 
     def hold(self, angle: str, stiffness: float, damping: float = 0.0,
-             target: float | None = None) -> None:
+             target: float | None = None, max_torque: float = math.inf) -> None:
         """Put a spring on a joint angle, torque -stiffness (angle - target) - damping rate.
 
         It replaces the angle's spring, if any. Only the rigid engine has joint springs.
@@ -423,6 +424,7 @@ class Simulation:
             stiffness: N m/rad.
             damping: N m s/rad.
             target: rad; None: the current angle.
+            max_torque: N m, to which the torque is limited.
 
         Raises:
             UnknownJoint: the scene has no such angle.
@@ -433,12 +435,57 @@ class Simulation:
         >>> simulation.hold('left_shin', stiffness=300, damping=5)
         """
         self._require(Capability.JOINT_SPRINGS)
-        self._joint_springs.hold(angle, stiffness, damping, target, self.joint_angles)
+        self._joint_springs.hold(angle, stiffness, damping, target, max_torque,
+                                 self.joint_angles)
+
+    def set_pose_target(self, joint_angles: Mapping[str, float] | None = None,
+                        rates: Mapping[str, float] | None = None) -> None:
+        """Set targets of joint springs, those of motors or of hold(); others stay.
+
+        Args:
+            joint_angles: rad, by Scene.angle_names; of an angle in ``rates`` alone it stays.
+            rates: rad/s, at which the targets move on for 0.2 s, then they stand; 0 where none is
+                given. The damping is relative to it.
+
+        Raises:
+            UnknownJoint: the scene has no such angle.
+            NotFinite, OutOfRange, WrongForm: for a number, or an angle without a spring.
+
+        >>> simulation.hold('left_shin', stiffness=300, damping=5, max_torque=50)
+        >>> simulation.set_pose_target({'left_shin': 0.5})
+        """
+        self._joint_springs.set_targets(joint_angles or {}, rates or {}, self.time)
+
+    def set_strength(self, strength: float, names: str | Sequence[str] | None = None) -> None:
+        """Set the strength of joint springs, by which stiffness, damping and max_torque are
+        multiplied. At 0 a joint is limp.
+
+        Args:
+            strength: 0 to 1.
+            names: the name of a doll; or names of joint angles, or of bones, whose joints are those
+                above them; None: all dolls.
+
+        Raises:
+            UnknownDoll, UnknownJoint: the scene has none of this name.
+            OutOfRange: for a strength that is none.
+
+        >>> simulation.set_strength(0.3, ['left_shin'])
+        """
+        if names is None or isinstance(names, str):
+            names = self._angles_of(None if names is None else self._doll_index(names))
+        self._joint_springs.set_strength(strength, names)
 
     @property
     def animated(self) -> tuple[str, ...]:
         """Names of the dolls that their animations move."""
         return tuple(self.scene.dolls[doll].name for doll in self._animations.dolls)
+
+    @property
+    def powered(self) -> tuple[str, ...]:
+        """Names of the dolls that their animations, or springs on their joints, move."""
+        bones = {spring.bone for spring in self._joint_springs.springs(self.time)}
+        dolls = {*self._animations.dolls, *self.scene.doll_of_bone[list(bones)].tolist()}
+        return tuple(self.scene.dolls[doll].name for doll in sorted(dolls))
 
     def go_limp(self, angles: str | Sequence[str] | None = None) -> None:
         """Let a doll go limp: end its animation, from which it falls with the pose and velocities
@@ -456,10 +503,8 @@ class Simulation:
         """
         if isinstance(angles, str):
             doll = self._doll_index(angles)
-            placement = self.scene.dolls[doll]
             self._release([doll], 'go_limp')
-            angles = [self.scene.qualified(placement, name) for joint in placement.doll.joints
-                      for name in joint.angle_names]
+            angles = self._angles_of(doll)
         elif angles is None:
             self._release(self._animations.dolls, 'go_limp')
         self._joint_springs.go_limp(angles)
@@ -485,6 +530,8 @@ class Simulation:
                     until = min(until, self._driven.next_change(self.time, end))
                 if self._animations:
                     until = min(until, self._animations.next_change(self.time, end))
+                if self._joint_springs:
+                    until = min(until, self._joint_springs.next_change(self.time, end))
                 self._advance_until(until)
             substates.append(self.state)
         self.substates = tuple(substates)
@@ -532,7 +579,7 @@ class Simulation:
         errors.check_finite('coordinates', (*q.tolist(), *v.tolist()))
         layout.check_orientations(q)
         self._placed, self._overlaps, self._plays = GeneralizedState(q, v), None, False
-        for doll in self._animations.dolls:
+        for doll in self._animations.kinematic:
             self._engine.set_kinematic(doll, False)
         self._engine.set_coordinates(self._placed)
         self._engine.discard(self._start)
@@ -756,6 +803,14 @@ class Simulation:
             raise errors.UnknownDoll('doll', doll, errors.one_of(names, doll))
         return names.index(doll)
 
+    def _angles_of(self, doll: int | None) -> Sequence[str]:
+        """Names of the joint angles of a doll; None: of all."""
+        if doll is None:
+            return self.scene.angle_names
+        placement = self.scene.dolls[doll]
+        return [self.scene.qualified(placement, name) for joint in placement.doll.joints
+                for name in joint.angle_names]
+
     def _with_given(self, doll: int, key: str, given: Mapping[str, float],
                     values: np.ndarray) -> np.ndarray:
         """Angles or rates (k,) of all dolls with those of a doll that are given by its names."""
@@ -812,6 +867,8 @@ class Simulation:
 
     def _advance_until(self, end: int) -> None:
         """Integrate until ``end``, ns; no push begins or ends before."""
+        if self._animations:
+            self._animations.aim(self._joint_springs, self.time, end)
         loads: tuple[Wrenches, Springs, Drives] = (), self._springs, ()
         if self._follows:
             dolls, twists = self._driven.twists(self.time, end, self.state)
@@ -847,6 +904,8 @@ class Simulation:
         animated = [doll for doll in dolls if doll in self._animations.dolls]
         if animated:
             self._animations.release(self._engine, animated, self.time)
+            for doll in animated:
+                self._joint_springs.go_limp(self._angles_of(doll))
             self._went_limp([self.scene.dolls[doll].name for doll in animated], reason)
 
     def _went_limp(self, dolls: Sequence[str], reason: str) -> None:
@@ -871,7 +930,7 @@ class Simulation:
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs),
                   *(self._driven.moving_bones(self.time) if self._follows else ()),
-                  *(self.scene.bone_slices[doll].start for doll in self._animations.dolls))
+                  *(self.scene.bone_slices[doll].start for doll in self._animations.kinematic))
         dolls = detector.find_ready(self._engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs
             return
@@ -909,7 +968,7 @@ class Simulation:
         """(n,) bones that the ground bears: neither bodies that follow exactly nor animated."""
         if not self._animations:
             return self._yields
-        return self._yields & ~np.isin(self.scene.doll_of_bone, self._animations.dolls)
+        return self._yields & ~np.isin(self.scene.doll_of_bone, self._animations.kinematic)
 
     @cached_property
     def _gap(self) -> JointGap:
@@ -922,7 +981,7 @@ class Simulation:
     @property
     def _springs(self) -> Springs:
         """Springs of hands and of joint angles."""
-        return self._hands.springs + self._joint_springs.springs
+        return self._hands.springs + self._joint_springs.springs(self.time)
 
 
 def _needed(scene: Scene) -> Iterator[Capability]:
@@ -931,6 +990,8 @@ def _needed(scene: Scene) -> Iterator[Capability]:
         yield Capability.PASSIVE_TORQUES
     if any(placement.follow for placement in scene.dolls):
         yield Capability.DRIVEN_BODIES
+    if any(placement.motors for placement in scene.dolls):
+        yield Capability.JOINT_SPRINGS
     if any(isinstance(body.shape, Surface) for body in scene.bodies):
         yield Capability.SURFACES
 

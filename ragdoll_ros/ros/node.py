@@ -28,9 +28,10 @@ from .diagnostics import Diagnostics, DuplicateNodes, overlaps_text
 from .event_log import EventLog, RunScene
 from .impacts.publisher import ImpactPublisher
 from .imu.publishers import ImuPublishers
-from .inputs.body_subscriptions import BodySubscriptions
+from .inputs.bodies.body_subscriptions import BodySubscriptions
 from .inputs.input_counts import InputCounts
 from .inputs.interactive_marker_server import InteractiveMarkerServer
+from .inputs.motor_subscriptions import MotorSubscriptions
 from .inputs.no_world import NO_WORLD, NoWorld
 from .inputs.state_subscription import StateSubscription
 from .inputs.subscriptions import PushSubscriptions
@@ -111,6 +112,7 @@ class RagdollNode(Node):
         self.inputs = PushSubscriptions(self, self.input_counts)
         self.states = StateSubscription(self, self.input_counts, self._show_if_paused)
         self.bodies = BodySubscriptions(self, self.input_counts, self._show_if_paused)
+        self.motors = MotorSubscriptions(self, self.input_counts)
         self.interactive = InteractiveMarkerServer(self, self.input_counts, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
                                         self._diagnostic_values, self._diagnostics_stamp)
@@ -226,7 +228,8 @@ class RagdollNode(Node):
         self.has_world, self.paused = False, True
         self._event_log.unload()
         self.simulation.close()
-        self.inputs.simulation = self.states.simulation = self.bodies.simulation = NoWorld()
+        for inputs in (self.inputs, self.states, self.bodies, self.motors):
+            inputs.simulation = NoWorld()
         self._diagnostics.simulation = None
         self._outputs.unload()
         self.interactive.unload()
@@ -332,7 +335,9 @@ class RagdollNode(Node):
         prepared = prepared or self._prepare_scene(simulation.scene, self.settings)
         self._event_log.set_simulation(simulation, prepared.run_scene)
         self.has_world = True
-        self.simulation = self.inputs.simulation = self.states.simulation = simulation
+        self.simulation = simulation
+        for inputs in (self.inputs, self.states, self.motors):
+            inputs.simulation = simulation
         self.bodies.set_simulation(simulation, self.settings)
         self._diagnostics.simulation = simulation
         self.inputs.settings = self.states.settings = self.settings

@@ -69,12 +69,12 @@ class Services:
         return _respond(response, True, f'{word} at {self._time():.9g} s')
 
     def _go_limp(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Let all animated dolls go limp; refused if there is none."""
+        """Let all dolls with animations or motors go limp; refused if there is none."""
         simulation = self._controlled.simulation
-        dolls = simulation.animated
+        dolls = simulation.powered
         if not dolls:
-            self._controlled.input_counts.refuse('~/go_limp', 'no animated doll')
-            return _respond(response, False, 'no doll is moved by an animation')
+            self._controlled.input_counts.refuse('~/go_limp', 'no doll with animation or motors')
+            return _respond(response, False, 'no doll is moved by an animation or by motors')
         simulation.go_limp()
         return _respond(response, True, f'{", ".join(dolls)} limp at {self._time():.9g} s')
 

@@ -38,8 +38,8 @@ class Controls:
         self.pushes = PushKeys(server, source)
         self.ball = BallThrower(server, source)
         self.go_limp = gui.add_button(
-            'Go limp', visible=False, hint='End the animation: the doll falls, from its pose and '
-            'with its velocities')
+            'Go limp', visible=False, hint='End animations and motors: the doll falls, from its pose '
+            'and with its velocities')
         self.go_limp.on_click(self._on_go_limp)
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
@@ -60,9 +60,9 @@ class Controls:
             self._show_engine(status.engine)
 
     def show_animated(self, scene: Scene) -> None:
-        """Show the button that ends animations, if the scene has any."""
+        """Show the button that ends animations and motors, if the scene has any."""
         self.go_limp.visible = self.source.recording is None and any(
-            placement.animation for placement in scene.dolls)
+            placement.animation or placement.motors for placement in scene.dolls)
 
     def show_scene(self, name: str) -> None:
         """Show the name of the scene.
@@ -86,7 +86,7 @@ class Controls:
         self._try(client, load, lambda: self.show_scene(self._shown_scene))
 
     async def _on_go_limp(self, _: viser.GuiEvent) -> None:
-        """End animations; in viser's thread, so that it comes before a later step."""
+        """End animations and motors; in viser's thread, so that it comes before a later step."""
         self.source.go_limp()
 
     async def _on_scene(self, event: viser.GuiEvent) -> None:

@@ -1,7 +1,8 @@
 """Animations: the dolls of a scene that their animations move, until each goes limp.
 
 Within an interval such a doll moves at the constant velocities that take it to where the animation
-is at the end; there it has the animation's own. Times in ns.
+is at the end; there it has the animation's own. A doll with motors is not moved: the animation sets
+the targets of its motors. Times in ns.
 """
 from __future__ import annotations
 
@@ -17,6 +18,7 @@ from ...model.scene import SECOND, Placement, Scene
 from ...model.scene_change import SceneChange
 from ...model.state import State
 from ..engine.protocol import Drives, Engine, Spring, Springs, Wrenches
+from .joint_springs import JointSprings
 
 
 @dataclasses.dataclass
@@ -81,6 +83,18 @@ class Animations:
         """Indices of the dolls."""
         return list(self._animated)
 
+    @property
+    def kinematic(self) -> list[int]:
+        """Indices of those without motors, which move as they are told."""
+        return [doll for doll, each in self._animated.items() if each.placement.is_animated]
+
+    def aim(self, springs: JointSprings, time: int, end: int) -> None:
+        """Let the targets of motors move with the animations from ``time`` to ``end``."""
+        for doll, each in self._animated.items():
+            if not each.placement.is_animated:
+                state, layout = each.moving(time, end), each.placement.animation.motion.layout
+                springs.follow(doll, layout.joint_angles(state.q), layout.joint_rates(state), time)
+
     def change_scene(self, change: SceneChange, time: int) -> None:
         """Let the dolls that stay go on, and those that come begin at ``time``."""
         after = Animations(change.after, time)._animated
@@ -129,18 +143,20 @@ class Animations:
         """Let dolls go limp, from the pose and with the velocities of that instant."""
         for doll in dolls:
             each = self._animated.pop(doll)
-            engine.set_kinematic(doll, False)
-            engine.set_doll(doll, _with(engine, {doll: each.at(time)}))
+            if each.placement.is_animated:
+                engine.set_kinematic(doll, False)
+                engine.set_doll(doll, _with(engine, {doll: each.at(time)}))
 
     def restore(self, engine: Engine) -> None:
         """Tell the engine, whose state was set, which dolls are animated."""
         for doll, placement in enumerate(engine.scene.dolls):
-            if placement.animation is not None:
+            if placement.is_animated:
                 engine.set_kinematic(doll, doll in self._animated)
 
     def _set(self, engine: Engine, state: Callable[[_Animated], GeneralizedState]) -> None:
-        engine.set_motion(self.dolls, _with(
-            engine, {doll: state(each) for doll, each in self._animated.items()}))
+        if kinematic := self.kinematic:
+            engine.set_motion(kinematic, _with(
+                engine, {doll: state(self._animated[doll]) for doll in kinematic}))
 
 
 def _forces(loads: tuple[Wrenches, Springs, Drives],

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -164,17 +165,25 @@ class Spring:
 
 @dataclass(frozen=True)
 class AppliedJointSpring:
-    """A spring on an angle of the joint above a bone: torque -k (angle - target) - c rate, N m."""
+    """A spring on an angle of the joint above a bone: torque -k (angle - target) - c (rate - u),
+    N m, limited to ``most``. The target moves on at u.
+    """
 
     bone: int
     axis: int
     """Index of the joint's axis."""
     target: float
-    """rad"""
+    """rad, now"""
     stiffness: float
     """k, N m/rad."""
     damping: float
     """c, N m s/rad."""
+    most: float = math.inf
+    """N m: torque limit."""
+    rate: float = 0.0
+    """u, rad/s, of the target."""
+    left: float = math.inf
+    """s for which the target moves; then u is 0."""
 
 
 Springs = Sequence[Spring | AppliedJointSpring]

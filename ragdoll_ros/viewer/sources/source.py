@@ -151,7 +151,7 @@ class Source(Protocol):
         """Go back to the start."""
 
     def go_limp(self) -> None:
-        """Let all dolls go limp that an animation moves."""
+        """Let all dolls go limp that animations or motors move."""
 
     def set_real_time_factor(self, factor: float) -> None:
         """Set the simulated time per wall time."""

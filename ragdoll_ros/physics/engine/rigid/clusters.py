@@ -743,7 +743,7 @@ def _keys(scene: Scene) -> list[tuple[object, ...]]:
     """What determines the system of each doll in a scene. An animated one's changes when it goes
     limp: no other doll has the same, nor has the same doll in another scene.
     """
-    return [(id(placement.doll), placement.is_kinematic) if placement.animation is None
+    return [(id(placement.doll), placement.is_kinematic) if not placement.is_animated
             else (id(placement.doll), placement.name, id(scene)) for placement in scene.dolls]
 
 

@@ -65,7 +65,7 @@ class RigidEngine:
         self._heights = GroundHeights(scene)
         self._spins = self.layout.root_angular_velocities
         for doll, placement in enumerate(scene.dolls):
-            if placement.animation is not None:
+            if placement.is_animated:
                 self._clusters.set_kinematic(doll, True)
         self._some_kinematic = bool(self._kinematic.any())
         self._twisted: list[int] = []

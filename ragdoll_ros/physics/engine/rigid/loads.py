@@ -48,8 +48,9 @@ def _grab(body: int, spring: Spring) -> np.ndarray:
 
 def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> np.ndarray:
     """Its mobility is that of the bone alone about its thinnest axis, an upper bound."""
-    record = _record(JOINT_SPRING, body, hold.stiffness, hold.damping, math.inf)
+    record = _record(JOINT_SPRING, body, hold.stiffness, hold.damping, hold.most)
     record['axis'], record['target_angle'] = hold.axis, hold.target
+    record['target_velocity'][0], record['time_left'] = hold.rate, hold.left
     record['mobility'] = 1 / min(scene.bones[hold.bone].inertia)
     return record
 

@@ -23,7 +23,8 @@ SPRING = np.dtype([
     ('max_force', float), ('saturated_force', float, 3), ('mobility', float)], align=True)
 """A spring on a body of the tree. ``point``: along the body's axes from its center of mass, m.
 ``target``, m, moves with ``target_velocity``, m/s (of an angular drive rad/s), for ``time_left`` s.
-``axis``, ``target_angle``, rad: of a joint spring. stiffness N/m or N m/rad, damping N s/m or
+``axis``, ``target_angle``, rad: of a joint spring, whose angle moves with the first entry of
+``target_velocity``, rad/s. stiffness N/m or N m/rad, damping N s/m or
 N m s/rad, max_force N or N m. ``saturated``: 1 if it exerts the constant ``saturated_force`` (its
 first entry for a joint spring) in this step. ``mobility``: the largest inverse inertia that it can
 act on, 1/kg or 1/(kg m^2)."""

@@ -78,12 +78,14 @@ def spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, sprin
     ``kin`` is that of q. ``time``: s since the spring's target was at spring.target.
     """
     i = spring.body
+    gone = min(time, spring.time_left)
+    moving = 1.0 if time < spring.time_left else 0.0
     if spring.kind == JOINT_SPRING:
-        speed = v[s.tree[i].v_start + spring.axis]
+        speed, rate = v[s.tree[i].v_start + spring.axis], spring.target_velocity[0]
         if spring.saturated:
             return (spring.saturated_force[0], 0.0, 0.0), (speed, 0.0, 0.0)
-        angle = q[s.tree[i].q_start + spring.axis]
-        torque = -spring.stiffness * (angle - spring.target_angle) - spring.damping * speed
+        stretch = q[s.tree[i].q_start + spring.axis] - spring.target_angle - gone * rate
+        torque = -spring.stiffness * stretch - spring.damping * (speed - moving * rate)
         return (torque, 0.0, 0.0), (speed, 0.0, 0.0)
     arm = point_of_body(s.tree[i], kin, i, spring.point)
     velocity = 0.0, 0.0, 0.0
@@ -93,12 +95,10 @@ def spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, sprin
         j = s.dof_parent[j]
     if spring.saturated:
         return vec(spring.saturated_force), velocity
-    gone = min(time, spring.time_left)
-    moving = 1.0 if time < spring.time_left else 0.0
     at = add(root_position(q, s.tree[s.body_root[i]].q_start), arm)
-    stretch = sub(sub(at, vec(spring.target)), scale(gone, vec(spring.target_velocity)))
+    away = sub(sub(at, vec(spring.target)), scale(gone, vec(spring.target_velocity)))
     slip = sub(velocity, scale(moving, vec(spring.target_velocity)))
-    return sub(scale(-spring.stiffness, stretch), scale(spring.damping, slip)), velocity
+    return sub(scale(-spring.stiffness, away), scale(spring.damping, slip)), velocity
 
 
 @compiled
@@ -135,13 +135,18 @@ def saturate_springs(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, v
                      springs: np.ndarray, time: float, h: float) -> bool:
     """Write saturated_force, and ``saturated`` 1, to springs whose mean force from v to ``v_free``
     would exceed max_force. Returns whether there are any. ``kin``, q, ``time``: of the middle.
+
+    The direction is that at v: far away, the mean is askew, by what an unlimited force would do in
+    the step. A joint's two directions cannot be, and one at v may be over at once.
     """
     some = False
     for k in range(len(springs)):
         spring = springs[k]
         force, _ = mean_spring_force(s, kin, q, v, v_free, spring, time, h)
         if norm(force) > spring.max_force:
-            force, _ = spring_force(s, kin, q, v, spring, time)
+            start, _ = spring_force(s, kin, q, v, spring, time)
+            if spring.kind != JOINT_SPRING and norm(start) > 0:
+                force = start
             put(spring.saturated_force, scale(spring.max_force / norm(force), force))
             spring.saturated = 1
             some = True

@@ -13,15 +13,15 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
-from ...model import errors, rotation
-from ...model.drive import MAX_SPEED
-from ...model.vectors import unit_vector
-from ...physics.simulation import Simulation
-from ..parameters.node_settings import NodeSettings
+from ....model import errors, rotation
+from ....model.drive import MAX_SPEED
+from ....model.vectors import unit_vector
+from ....physics.simulation import Simulation
+from ...parameters.node_settings import NodeSettings
+from ..input_counts import InputCounts
+from ..joint_values import joint_values
+from ..subscriptions import limited
 from .body_frames import BodyFrames
-from .input_counts import InputCounts
-from .joint_values import joint_values
-from .subscriptions import limited
 
 JOINTS = 'joint_states'
 

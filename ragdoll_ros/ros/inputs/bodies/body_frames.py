@@ -11,12 +11,12 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.subscription import Subscription
 
-from ...model import errors, rotation
-from ...model.pose import Pose
-from ...model.scene import SECOND, Scene
-from ...model.vectors import unit_vector
-from ..messages.tf import DEPTH, TFMessage
-from ..parameters.body_frames import parse_body_frames
+from ....model import errors, rotation
+from ....model.pose import Pose
+from ....model.scene import SECOND, Scene
+from ....model.vectors import unit_vector
+from ...messages.tf import DEPTH, TFMessage
+from ...parameters.body_frames import parse_body_frames
 
 TF, TF_STATIC = '/tf', '/tf_static'
 

@@ -1,0 +1,1 @@
+"""What moves driven bodies and robots: their topics, and frames of /tf."""

@@ -1,0 +1,44 @@
+"""Subscriptions that drive motors: a JointState sets targets, a Float64 the strength."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from ...model import errors
+from ...physics.simulation import Simulation
+from .input_counts import InputCounts
+from .joint_values import joint_values
+
+TARGET, STRENGTH = '~/pose_target', '~/motor_strength'
+
+
+class MotorSubscriptions:
+    """Subscriptions to ~/pose_target and ~/motor_strength.
+
+    The former has names, positions and velocities as on joint_states, of any joints with motors;
+    positions or velocities may be left out, efforts are ignored. The latter sets the strength of
+    all motors, 0 to 1.
+    """
+
+    def __init__(self, node: Node, counts: InputCounts) -> None:
+        self._counts = counts
+        self.simulation: Simulation
+        node.create_subscription(JointState, TARGET, self.on_pose_target, 10)
+        node.create_subscription(Float64, STRENGTH, self.on_strength, 10)
+
+    def on_pose_target(self, message: JointState) -> None:
+        """Set targets; a message that is wrong is refused and counted, all of it."""
+        self._take(TARGET, lambda: self.simulation.set_pose_target(*joint_values(message)))
+
+    def on_strength(self, message: Float64) -> None:
+        """Set the strength of all motors; what is no strength is refused and counted."""
+        self._take(STRENGTH, lambda: self.simulation.set_strength(message.data))
+
+    def _take(self, topic: str, act: Callable[[], None]) -> None:
+        try:
+            act()
+        except errors.ModelError as error:
+            self._counts.refuse(topic, error)
