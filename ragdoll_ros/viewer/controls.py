@@ -38,8 +38,8 @@ class Controls:
         self.pushes = PushKeys(server, source)
         self.ball = BallThrower(server, source)
         self.go_limp = gui.add_button(
-            'Go limp', visible=False, hint='End animations and motors: the doll falls, from its pose '
-            'and with its velocities')
+            'Go limp', visible=False, hint='End animations and motors: the doll falls, from its '
+            'pose and with its velocities')
         self.go_limp.on_click(self._on_go_limp)
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
