@@ -4,15 +4,22 @@ Each is a body whose true tree is known, with the tree of its file rewired: feet
 from the root or from nothing, controls and poles that move no skin, a pelvis in two halves, a thigh
 for a root. Each has three skins: one whose weights go over smoothly, one of weights 0 and 1, and
 islands of rigid skin for each bone, which share nothing.
+
+Others have the tree that they should have, and a skin that contradicts it: bones that move the skin
+of others far away, as painted or guessed weights do.
 """
 import functools
+import re
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import fit_rigs
 import numpy as np
 from fit_rigs import HALF, Bone, Rig, matrix
+
+BLEEDING = 0.4
+"""Share of a bone in the skin of another: below one half, so that the skin stays the other's."""
 
 CELL = 0.03
 """Edge of the cells that a skin is made of, m."""
@@ -26,6 +33,8 @@ class Wild:
     """Bone to its parent, as the body is built; bones without skin are not in it."""
     roots: tuple
     """Bones one of which the root's body must hold."""
+    bleeds: dict = field(default_factory=dict)
+    """Bone to another that moves its skin as well."""
 
 
 def segment_distances(points, bones):
@@ -109,7 +118,18 @@ def skin_of(wild):
     """The mesh of a rig: of its bones that have a radius."""
     held = np.array([k for k, bone in enumerate(wild.rig.bones) if bone.radius > 0])
     points, faces, joints, weights = SKINS[wild.skin]([wild.rig.bones[k] for k in held])
-    return points, faces, held[joints], weights
+    return points, faces, *bled(held[joints], weights, wild)
+
+
+def bled(joints, weights, wild):
+    """Joints and weights where other bones have a share of BLEEDING in those of some."""
+    names = [bone.name for bone in wild.rig.bones]
+    joints, weights = joints.copy(), weights.copy()
+    for bone, other in wild.bleeds.items():
+        main = joints[:, 0] == names.index(bone)
+        joints[main, 3] = names.index(other)
+        weights[main, 3] = BLEEDING
+    return joints, weights / weights.sum(axis=1, keepdims=True)
 
 
 def control(name, at, parent=None):
@@ -152,9 +172,28 @@ def person():
             else bone for bone in bones]
 
 
+def arms_down(bones):
+    """A person whose hands hang beside the hips."""
+    down = {'Arm': ((.18, 1.42, 0), (.2, 1.18, 0)), 'ForeArm': ((.2, 1.18, 0), (.23, .97, .01)),
+            'Hand': ((.23, .97, .01), (.25, .86, .01))}
+
+    def hangs(bone):
+        end = re.split('Left|Right', bone.name)[-1]
+        if bone.name.endswith('Hips'):
+            return replace(bone, radius=.16)
+        if end not in down:
+            return bone
+        sign = 1 if 'Left' in bone.name else -1
+        head, tail = ((sign * x, y, z) for x, y, z in down[end])
+        return replace(bone, head=head, tail=tail)
+
+    return [hangs(bone) for bone in bones]
+
+
 M = 'mixamorig:'
 FEET = tuple(f'{M}{side}Foot' for side in ('Left', 'Right'))
 HANDS = tuple(f'{M}{side}Hand' for side in ('Left', 'Right'))
+LIMBS = ('UpLeg', 'Leg', 'Foot', 'Arm')
 TRUNK = (f'{M}Hips', f'{M}Spine', f'{M}Spine1', f'{M}Spine2')
 
 
@@ -170,6 +209,9 @@ def person_rigs():
     yield 'feet_of_a_control', rewired(
         true, {**dict.fromkeys(FEET, 'Root'), TRUNK[0]: 'Root'}, [root]), true, {}
     yield 'hands_of_root', rewired(true, dict.fromkeys(HANDS, TRUNK[0])), true, {}
+    hangs = arms_down(true)
+    yield 'arms_down', rewired(hangs, {}), hangs, {}
+    yield 'arms_down_hands_of_root', rewired(hangs, dict.fromkeys(HANDS, TRUNK[0])), hangs, {}
     yield 'hands_and_feet_of_nothing', rewired(true, dict.fromkeys(FEET + HANDS)), true, {}
     yield 'poles', rewired(
         true, {**dict.fromkeys(FEET + HANDS, 'Root'), TRUNK[0]: 'Root'}, poles), true, {}
@@ -213,6 +255,30 @@ def animal_rigs():
         snake, {bone.name: None for bone in snake}), snake, ('link4', 'link5', 'link6', 'link7')
 
 
+def bleeding_rigs():
+    """Name, bones, roots, and which bones move the skin of which others."""
+    true, dog = person(), fit_rigs.quadruped()
+
+    def both(bone, other, crossed=False):
+        sides = ('Left', 'Right')
+        theirs = (sides[::-1] if crossed else sides) if other in LIMBS else ('', '')
+        return {f'{M}{side}{bone}': f'{M}{its}{other}'
+                for side, its in zip(sides, theirs, strict=True)}
+
+    yield 'hips_move_forearms', true, TRUNK, both('ForeArm', 'Hips')
+    yield 'head_moves_shoulders', true, TRUNK, both('Shoulder', 'Head')
+    yield 'hips_move_shoulders', true, TRUNK, both('Shoulder', 'Hips')
+    yield 'thighs_move_hands', true, TRUNK, both('Hand', 'UpLeg')
+    yield 'feet_move_each_other', true, TRUNK, both('Foot', 'Foot', crossed=True)
+    yield 'shins_move_the_other_thigh', true, TRUNK, both('UpLeg', 'Leg', crossed=True)
+    yield 'upper_arms_move_shins', true, TRUNK, both('Leg', 'Arm')
+    trunk = ('Hip', 'Spine1', 'Spine2')
+    yield 'hind_legs_move_fore_legs', dog, trunk, {
+        f'{side}{end}': f'{side}{other}' for side in ('Left', 'Right')
+        for end, other in (('UpperArm', 'Thigh'), ('ForeArm', 'Shin'))}
+    yield 'a_thigh_moves_the_tail', dog, trunk, {'Tail1': 'LeftThigh'}
+
+
 def _wild():
     for name, bones, true, extra in person_rigs():
         roots = (*TRUNK, 'pelvis_L', 'pelvis_R')
@@ -222,6 +288,9 @@ def _wild():
     for name, bones, true, roots in animal_rigs():
         for skin in SKINS:
             yield Wild(Rig(f'{name}-{skin}', bones), skin, truth_of(true), roots)
+    for name, bones, roots, bleeds in bleeding_rigs():
+        for skin in SKINS:
+            yield Wild(Rig(f'{name}-{skin}', bones), skin, truth_of(bones), roots, bleeds)
 
 
 WILD = {wild.rig.name: wild for wild in _wild()}

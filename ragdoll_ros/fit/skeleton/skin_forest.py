@@ -1,11 +1,11 @@
-"""Edges between the bones of a character, as shown by their skin.
+"""Edges between the bones of a character, of its file and as shown by their skin.
 
-First the edges of the file that the skin confirms, then the pairs that share most skin, then the
-nearest.
+First the edges of the file that can be: that the skin confirms, or whose joint lies in or near both
+bodies. Then the pairs that share most skin, then the nearest.
 """
 import numpy as np
 
-from ...files.bone_names.names import SINGLE_ROLES
+from ...files.bone_names.names import ARM, LEG, SINGLE_ROLES, side_of
 from ..reading.character import Character
 from .skin_adjacency import cluster_distances, find_adjacency
 
@@ -44,6 +44,8 @@ class SkinForest:
                                for cluster, role in zip(clusters, roles, strict=True)])
         self.skinned = [bone for bone, cluster in enumerate(clusters) if len(cluster)]
         self.skinned_parents = [self._skinned_above(bone) for bone in range(len(clusters))]
+        self._boxes = {bone: (skin.min(axis=0), skin.max(axis=0)) for bone in self.skinned
+                       if len(skin := character.vertices[clusters[bone]])}
         self.mirrored = self._find_mirrored()
         self.adjacency = find_adjacency(character)
         # Symmetrized, so that left and right get the same edges.
@@ -66,18 +68,22 @@ class SkinForest:
                 self.halves.append((bone, other))
 
     def join_file_edges(self) -> None:
-        """Connect bones to their parents in the file where their skins meet."""
+        """Connect bones to their parents in the file where their skins meet, or where the bone's
+        joint lies in or near both.
+        """
         for bone in self.skinned:
             parent = self.skinned_parents[bone]
-            if parent >= 0 and self.mirrored[bone] != parent and (
-                    self.shared[bone, parent] > MIN_FILE_AREA * self.shared[bone].max() > 0):
+            if parent >= 0 and self.mirrored[bone] != parent and self._can_be(bone, parent):
                 self._join(bone, parent)
 
     def join_shared_skin(self) -> None:
-        """Connect bones that share skin, the largest shared area first."""
+        """Connect bones that share skin, the largest shared area first; no limb to its twin or to
+        another limb.
+        """
         least = MIN_SHARED_AREA * np.minimum(self.areas[:, None], self.areas)
         pairs = [(a, b) for a, b in np.argwhere(np.triu(self.shared > least))
-                 if self.mirrored[a] != b and len(self.clusters[a]) and len(self.clusters[b])]
+                 if self.mirrored[a] != b and len(self.clusters[a]) and len(self.clusters[b])
+                 and not self._are_limbs_apart(a, b)]
         for a, b in sorted(pairs, key=lambda pair: -self.shared[pair]):
             self._join(int(a), int(b))
 
@@ -112,6 +118,32 @@ class SkinForest:
                 edge = int(top), int(outside[np.argmin(distances[top, outside])])
                 self.fixed.append(edge)
             self._join(*edge)
+
+    def _can_be(self, bone: int, parent: int) -> bool:
+        """Whether an edge of the file can be: the skin confirms it, or the bone's joint lies in or
+        near both; and no other bone is nearer to the joint and shares more skin, or as much where
+        the skin says nothing: a hand may hang beside the hips.
+        """
+        shared, above = self.shared[bone], self._distance(bone, parent)
+        confirmed = shared[parent] > MIN_FILE_AREA * shared.max() > 0
+        near = max(self._distance(bone, bone), above) <= TOUCH_DISTANCE * self.character.extent
+        return (confirmed or near) and not any(
+            self._distance(bone, other) < above and (
+                shared[other] > shared[parent] if confirmed else shared[other] >= shared[parent])
+            for other in self.skinned if other != bone and self.skinned_parents[other] != bone)
+
+    def _distance(self, joint: int, bone: int) -> float:
+        """Distance, m, of the root of the bone ``joint`` from the box about another's skin."""
+        low, high = self._boxes[bone]
+        place = self.character.positions[joint]
+        return float(np.linalg.norm(np.maximum(low - place, place - high).clip(min=0.0)))
+
+    def _are_limbs_apart(self, a: int, b: int) -> bool:
+        """Whether by their names two bones are of an arm and a leg, or of limbs of two sides."""
+        limbs = [next((limb for limb in (ARM, LEG) if self.roles[bone] in limb), None)
+                 for bone in (a, b)]
+        sides = [side_of(self.character.bone_names[bone]) for bone in (a, b)]
+        return None not in limbs and (limbs[0] != limbs[1] or sides[0] * sides[1] < 0)
 
     def _join(self, a: int, b: int) -> None:
         if self._tree_of[a] != self._tree_of[b]:
