@@ -16,6 +16,7 @@ from .pipeline import Fit, FitOptions, fit_characters
 from .reading.character import read_character
 from .report import animations_report, captures_report, doll_report, fit_report
 from .robots.robot import read_urdf
+from .skeleton.skin_tree import TREES
 
 EPILOG = """\
 example:
@@ -34,7 +35,8 @@ PICTURE_SUFFIXES = ('.png', '.jpg', '.svg', '.pdf')
 DOLL_SUFFIXES, ROBOT_SUFFIXES = ('.yaml', '.yml'), ('.urdf', '.xml')
 """Files that define bodies; for all other files, characters, bodies are fitted."""
 
-FIT_ARGUMENTS = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest', 'keep')
+FIT_ARGUMENTS = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest', 'keep',
+                 'tree', 'root')
 """Options that apply to fitted bodies only."""
 
 
@@ -90,6 +92,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--animation', nargs='+', action='extend', default=[], metavar='MOVE.bvh',
                         help='report how well the doll can follow this motion capture too, by '
                         'which a scene can move it')
+    parser.add_argument('--tree', choices=TREES, default='auto',
+                        help="whose tree of bones: the file's where a joint lies in or near both "
+                        "bodies, else the skin's (default); all of the file's; or the skin's alone")
+    parser.add_argument('--root', metavar='BONE',
+                        help='the bone that becomes the root (default: found in the trunk)')
     parser.add_argument('--strict', action='store_true',
                         help='exit with code 3 unless the verdict is good')
     return parser
@@ -133,7 +140,7 @@ def _make_dolls(options: argparse.Namespace, path: Path) -> list[tuple[Placement
         return [(Placement(doll), None, doll_report(doll, notes))]
     fits = fit_characters(read_character(path, options.scale), FitOptions(
         options.shape, options.orientation, options.weight, options.smallest, options.mass,
-        options.masses, tuple(options.keep)))
+        options.masses, tuple(options.keep), options.tree, options.root))
     heads = _headings([fit.doll for fit in fits], 'character')
     dolls = [fit.placed(model=str(path)) for fit in fits]
     return [(doll, fit, head + '\n'.join([fit_report(fit), *animations_report(doll.doll)]))

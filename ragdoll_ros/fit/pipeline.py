@@ -57,6 +57,10 @@ class FitOptions:
     """Mass distribution by skin 'volume', by a person's 'proportions', or 'best'; see masses.py."""
     keep: tuple[str, ...] = ()
     """Names or patterns of bones that become bodies whatever their size."""
+    tree: str = 'auto'
+    """Whose tree of bones: the 'file''s, the 'skin''s, or 'auto'; see skin_tree.TREES."""
+    root: str | None = None
+    """Name of the bone that is the root; None: found in the trunk."""
 
 
 @dataclass(frozen=True)
@@ -97,10 +101,14 @@ def fit_characters(character: Character, options: FitOptions | None = None) -> l
     options = options or FitOptions()
     names = character.bone_names
     forced = {names[bone] for bone in find_forced_bodies(character, options.keep, options.weight)}
+    if options.root is not None and options.root not in names:
+        raise errors.UnknownBone('root', options.root, errors.one_of(names, options.root))
     fits = []
     for each, frame in split_characters(character):
         own = tuple(glob.escape(name) for name in each.bone_names if name in forced)
-        fits.append(replace(fit_character(each, replace(options, keep=own)), frame=frame))
+        root = options.root if options.root in each.bone_names else None
+        fits.append(replace(fit_character(each, replace(options, keep=own, root=root)),
+                            frame=frame))
     return fits
 
 
@@ -144,7 +152,8 @@ def _group_character(character: Character,
     character = replace(character, springs=tuple(_without_forced(character.springs, forced)))
     swinging = frozenset(bone for spring in character.springs for bone in spring.bones)
     clusters = vertices_by_bone(character, options.weight, swinging)
-    tree = find_skin_tree(character, clusters, roles_of(character.bone_names, character.parents))
+    tree = find_skin_tree(character, clusters, roles_of(character.bone_names, character.parents),
+                          options.tree, options.root)
     roles = _roles_along(tree, character.bone_names)
     springs = _without_forced(soft_chains(character, tree, roles, clusters), forced)
     swinging |= {bone for spring in springs for bone in spring.bones}

@@ -44,8 +44,7 @@ class SkinForest:
                                for cluster, role in zip(clusters, roles, strict=True)])
         self.skinned = [bone for bone, cluster in enumerate(clusters) if len(cluster)]
         self.skinned_parents = [self._skinned_above(bone) for bone in range(len(clusters))]
-        self._boxes = {bone: (skin.min(axis=0), skin.max(axis=0)) for bone in self.skinned
-                       if len(skin := character.vertices[clusters[bone]])}
+        self.joint_distances = self._find_joint_distances()
         self.mirrored = self._find_mirrored()
         self.adjacency = find_adjacency(character)
         # Symmetrized, so that left and right get the same edges.
@@ -67,13 +66,14 @@ class SkinForest:
                 self._join(bone, other)
                 self.halves.append((bone, other))
 
-    def join_file_edges(self) -> None:
+    def join_file_edges(self, trusted: bool) -> None:
         """Connect bones to their parents in the file where their skins meet, or where the bone's
-        joint lies in or near both.
+        joint lies in or near both; everywhere if the file is ``trusted``.
         """
         for bone in self.skinned:
             parent = self.skinned_parents[bone]
-            if parent >= 0 and self.mirrored[bone] != parent and self._can_be(bone, parent):
+            if parent >= 0 and (trusted or (
+                    self.mirrored[bone] != parent and self._can_be(bone, parent))):
                 self._join(bone, parent)
 
     def join_shared_skin(self) -> None:
@@ -124,19 +124,25 @@ class SkinForest:
         near both; and no other bone is nearer to the joint and shares more skin, or as much where
         the skin says nothing: a hand may hang beside the hips.
         """
-        shared, above = self.shared[bone], self._distance(bone, parent)
+        shared, off = self.shared[bone], self.joint_distances[bone]
         confirmed = shared[parent] > MIN_FILE_AREA * shared.max() > 0
-        near = max(self._distance(bone, bone), above) <= TOUCH_DISTANCE * self.character.extent
-        return (confirmed or near) and not any(
-            self._distance(bone, other) < above and (
-                shared[other] > shared[parent] if confirmed else shared[other] >= shared[parent])
-            for other in self.skinned if other != bone and self.skinned_parents[other] != bone)
+        near = max(off[bone], off[parent]) <= TOUCH_DISTANCE * self.character.extent
+        more = shared > shared[parent] if confirmed else shared >= shared[parent]
+        others = [other for other in np.flatnonzero((off < off[parent]) & more)
+                  if other != bone and self.skinned_parents[other] != bone]
+        return bool(confirmed or near) and not others
 
-    def _distance(self, joint: int, bone: int) -> float:
-        """Distance, m, of the root of the bone ``joint`` from the box about another's skin."""
-        low, high = self._boxes[bone]
-        place = self.character.positions[joint]
-        return float(np.linalg.norm(np.maximum(low - place, place - high).clip(min=0.0)))
+    def _find_joint_distances(self) -> np.ndarray:
+        """Distances (n, n) m of the root of each bone from the box about the skin of each bone;
+        infinite for a bone without skin.
+        """
+        character, found = self.character, np.full((len(self.clusters),) * 2, np.inf)
+        for bone in self.skinned:
+            skin = character.vertices[self.clusters[bone]]
+            off = np.maximum(skin.min(axis=0) - character.positions,
+                             character.positions - skin.max(axis=0)).clip(min=0.0)
+            found[:, bone] = np.linalg.norm(off, axis=1)
+        return found
 
     def _are_limbs_apart(self, a: int, b: int) -> bool:
         """Whether by their names two bones are of an arm and a leg, or of limbs of two sides."""

@@ -1,16 +1,22 @@
-"""Kinematic tree of a character from its skin, rooted in the trunk, whatever the file's tree.
+"""Kinematic tree of a character: its file's where that can be, else from its skin.
 
 Animation rigs parent feet and hands to the root or to nothing, have controls without skin, and may
-start at any bone. The edges are those of skin_forest.py; the root is the bone that balances them.
+start at any bone. The edges are those of skin_forest.py; the root is in the trunk, the bone that
+balances them.
 """
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...files.bone_names.names import side_of
+from ...model import errors
 from ..reading.character import Character
 from .skin_adjacency import nearest_midpoint
 from .skin_forest import SkinForest
+
+TREES = ('auto', 'file', 'skin')
+"""Whose edges a tree has: the file's where they can be, else the skin's; all of the file's; or the
+skin's alone. Where neither connects two parts, the distance decides."""
 
 ROOT_BONUS = 0.2
 """Advantage of the file's root and of hips in the choice of the root, as a fraction of the skin."""
@@ -39,35 +45,55 @@ class SkinTree:
 
 
 def find_skin_tree(character: Character, clusters: list[np.ndarray],
-                   roles: tuple[str | None, ...]) -> SkinTree:
-    """Tree of a character's bones; ``clusters`` and ``roles`` are indexed by bone."""
+                   roles: tuple[str | None, ...], source: str = 'auto',
+                   root: str | None = None) -> SkinTree:
+    """Tree of a character's bones; ``clusters`` and ``roles`` are indexed by bone.
+
+    ``source``: one of TREES. ``root``: name of the root; None: found. Raises UnknownBone for a bone
+    that does not exist, WrongForm for one without skin.
+    """
     if not any(len(cluster) for cluster in clusters):
         return SkinTree((-1, *(0 for _ in clusters[1:])), {}, frozenset(), frozenset())
     forest = SkinForest(character, clusters, roles)
     forest.join_halves()
-    forest.join_file_edges()
+    if source != 'skin':
+        forest.join_file_edges(trusted=source == 'file')
     forest.join_shared_skin()
     forest.join_nearest()
-    root = _find_root(forest)
-    parents, order = _parents_from(forest, root)
+    first = _find_root(forest, source) if root is None else _named_root(forest, root)
+    parents, order = _parents_from(forest, first)
     fixed, halves = ({frozenset(edge) for edge in edges} for edges in (forest.fixed, forest.halves))
     edges = {bone: frozenset((bone, parents[bone])) for bone in order[1:]}
     anchors = {bone: _anchors(forest, bone, parents[bone]) for bone in order[1:]}
     for bone in set(range(len(clusters))) - set(order):
-        parents[bone] = _skinned_bone_near(forest, bone, root)
+        parents[bone] = _skinned_bone_near(forest, bone, first)
     return SkinTree(tuple(parents), anchors,
                     frozenset(bone for bone, edge in edges.items() if edge in halves),
                     frozenset(bone for bone, edge in edges.items() if edge in fixed))
 
 
-def _find_root(forest: SkinForest) -> int:
-    """The bone whose largest branch is smallest; a bone on the mirror plane if there is any."""
+def _named_root(forest: SkinForest, name: str) -> int:
+    names = forest.character.bone_names
+    if name not in names:
+        raise errors.UnknownBone('root', name, errors.one_of(names, name))
+    bone = names.index(name)
+    if bone not in forest.skinned:
+        raise errors.WrongForm('root', name, 'a bone that moves skin')
+    return bone
+
+
+def _find_root(forest: SkinForest, source: str) -> int:
+    """The bone whose largest branch is smallest; a bone on the mirror plane if there is any. Of the
+    file's tree the largest of its roots.
+    """
     names, roles = forest.character.bone_names, forest.roles
     halves = {bone for pair in forest.halves for bone in pair}
     single = [bone for bone in forest.skinned if bone in halves or (
         forest.mirrored[bone] == bone and not side_of(names[bone]))]
     tops = [bone for bone in forest.skinned if forest.skinned_parents[bone] < 0]
     first = max(tops, key=lambda bone: forest.areas[bone], default=-1)
+    if source == 'file' and first >= 0:
+        return first
 
     def imbalance(bone: int) -> float:
         trusted = bone == first or (roles[bone] == 'hips' and bone in single)
