@@ -54,8 +54,8 @@ def test_transforms_are_composed_as_scipy_composes_them(follower):
     matrix = np.eye(4)
     for move, turn in steps:
         matrix = matrix @ np.block([[turn.as_matrix(), move[:, None]], [np.zeros(3), 1.0]])
-    (name, pose, twist), = follower.driven
-    assert name == 'cart' and not np.any(twist) and not follower.refused
+    (name, pose, twist, stamp), = follower.driven
+    assert (name, stamp) == ('cart', 10 ** 9) and not np.any(twist) and not follower.refused
     assert pose[:3] == pytest.approx(matrix[:3, 3], abs=1e-12)
     assert rotation.matrix(np.array(pose[3:])) == pytest.approx(matrix[:3, :3], abs=1e-12)
 
@@ -82,7 +82,7 @@ def test_a_velocity_needs_two_poses_shortly_one_after_the_other(follower, stamps
     """1 m/s; after a gap, or a time that began anew, zero; a stamp that repeats is ignored."""
     for stamp in stamps:
         follower.on_transforms(TF, [transform('world', 'base', stamp, (stamp, 0, 0))])
-    assert [twist[0] for _, _, twist in follower.driven] == pytest.approx(moves)
+    assert [twist[0] for _, _, twist, _ in follower.driven] == pytest.approx(moves)
 
 
 def test_a_frame_without_a_connection_is_refused_only_after_a_second(follower):

@@ -24,11 +24,15 @@ TOPIC = '/ragdoll/bodies/my_arm/joint_states'
 
 
 @pytest.fixture
-def node(make_node, tmp_path):
+def path(tmp_path):
     (tmp_path / 'r.urdf').write_text(PLANAR)
-    path = tmp_path / 'robot.yaml'
-    path.write_text(SCENE)
-    return make_node(scene=str(path), start_paused=True)
+    (tmp_path / 'robot.yaml').write_text(SCENE)
+    return str(tmp_path / 'robot.yaml')
+
+
+@pytest.fixture
+def node(make_node, path):
+    return make_node(scene=path, start_paused=True)
 
 
 def joints(names=('shoulder', 'elbow'), position=(), velocity=()):
@@ -94,7 +98,7 @@ def test_odometry_is_that_of_the_root_link(node):
 @pytest.mark.parametrize('wrong, text', [
     (joints(position=(0, math.nan)), 'joint_angles.elbow: NotFinite'),
     (joints(velocity=(math.inf, 0)), 'rates.shoulder: NotFinite'),
-    (joints(['shoulder', 'hip'], (0, 0)), 'joint_angles.hip: UnknownJoint'),
+    (joints(['knee', 'hip'], (0, 0)), 'joint_angles.knee: UnknownJoint'),
     (joints(position=[0.0]), 'position: WrongForm'),
     (joints(['elbow', 'elbow'], (0, 0)), 'name: WrongForm')])
 def test_what_is_wrong_is_refused_and_counted(node, wrong, text):
@@ -120,11 +124,59 @@ def test_a_topic_that_stops_or_jumps_is_reported(node):
     assert (measures['body_jumps_total'], measures['stale_bodies']) == (2, 1)
     node.pause(False)
     node._diagnostics._on_timer()
-    assert 'nothing moves my arm' in node._diagnostics._level_and_message()[1]
+    said = node._diagnostics._level_and_message()[1]
+    assert ('nothing moves my arm: /ragdoll/bodies/my_arm/joint_states, '
+            '/ragdoll/bodies/my_arm/odom, /ragdoll/bodies/my_arm/cmd_vel are silent') in said
     node.bodies.on_joint_states('my arm', joints(velocity=(1, 0)))
     node.tick()
     assert 'nothing moves' not in node._diagnostics._level_and_message()[1]
     assert not node.input_counts.refused
+
+
+def test_joints_that_the_robot_has_not_are_left_out_beside_others(node, capfd):
+    for _ in range(2):
+        node.bodies.on_joint_states('my arm', joints(
+            ['finger', 'shoulder'], position=(0.5, 0.02), velocity=(3, 2)))
+        node.tick()
+    assert yaw(links(node)[0]) == pytest.approx(0.04, abs=1e-9)
+    assert not node.input_counts.refused
+    assert capfd.readouterr().err.count('my arm has no joint finger: left out') == 1
+
+
+@pytest.mark.parametrize('has_rates', [True, False])
+@pytest.mark.parametrize('rate, delay, noise', [
+    (50, 0.0, 0.0), (50, 0.0095, 0.001), (50, 0.02, 0.004), (125, 0.005, 0.001), (30, 0.0, 0.008)])
+def test_late_messages_do_not_change_the_speed_of_a_link(make_node, path, rate, delay, noise,
+                                                         has_rates):
+    """A sweep of 2.5 rad/s whose messages come now before, now after a tick: without their stamps a
+    link turns at 0 to twice that rate, and hits with it.
+    """
+    node = make_node(scene=path, start_paused=True, publish_clock=True)
+    rng, amplitude, pulse = np.random.default_rng(3), 1.25, 2.0
+
+    def sweep(t):
+        return amplitude * math.sin(pulse * t), amplitude * pulse * math.cos(pulse * t)
+
+    sent = [0.1 + k / rate for k in range(2 * rate)]
+    waiting = sorted((t + delay + abs(rng.normal(0, noise)), t) for t in sent)
+    off = []
+    for tick in range(180):
+        now = 0.01 * tick
+        while waiting and waiting[0][0] <= now:
+            _, t = waiting.pop(0)
+            angle, speed = sweep(t)
+            message = joints(['shoulder'], [angle], [speed] if has_rates else [])
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(
+                round(1e9 * t), 10 ** 9)
+            node.bodies.on_joint_states('my arm', message)
+        node.tick()
+        if now > 0.3:
+            off.append(links(node)[0][12] - sweep(now + 0.005)[1])
+    # In the age of a message the rate changes by so much; and the angle, which is put right in a
+    # tick. A rate that is taken from two angles is older.
+    age = 1 / rate + delay + 3 * noise + 0.01
+    bound = amplitude * pulse ** 2 * (age + age ** 2 / (2 * 0.01))
+    assert np.abs(off).max() < bound * (1 if has_rates else 1.5) < amplitude * pulse
 
 
 def test_topics_are_those_of_robots_and_not_of_their_links(node):

@@ -36,12 +36,15 @@ MOST_OVERLAPS = 4
 class Diagnostics:
     """Measures the cost of ticks; reports real-time factor, cost, error measures and counters.
 
-    ``node_values()``: values of the node to report, by key; ``stamp()``: stamp of a report, ns.
+    ``node_values()``: values of the node to report, by key; ``stamp()``: stamp of a report, ns;
+    ``body_topics(name)``: the topics that move a body.
     """
 
     def __init__(self, node: Node, steady: Clock, counts: InputCounts,
-                 node_values: Callable[[], dict], stamp: Callable[[], int]) -> None:
+                 node_values: Callable[[], dict], stamp: Callable[[], int],
+                 body_topics: Callable[[str], list[str]]) -> None:
         self._node, self._steady, self._counts = node, steady, counts
+        self._body_topics = body_topics
         self._node_values, self._stamp = node_values, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._last_counted = self._last_dropped = self._last_bad = 0
@@ -107,9 +110,10 @@ class Diagnostics:
         warnings += filter(None, [values['unheard_cmd_vel']])
         warnings += self._lag_warnings(requested, values)
         if requested and (stale := self.simulation.stale_bodies):
-            warnings.append(f'nothing moves {", ".join(stale[:MOST_STALE])}'
-                            + (f' and {len(stale) - MOST_STALE} more' * (len(stale) > MOST_STALE))
-                            + ': ~/bodies/<name>/odom and cmd_vel are silent')
+            warnings += [f'nothing moves {name}: {", ".join(self._body_topics(name))} are silent'
+                         for name in stale[:MOST_STALE]]
+            if len(stale) > MOST_STALE:
+                warnings.append(f'nor {len(stale) - MOST_STALE} other bodies')
         bad, self._last_bad = values['bad_states'] - self._last_bad, values['bad_states']
         if bad:
             dump = values['state_dump'] and f'; the states before are in {values["state_dump"]}'

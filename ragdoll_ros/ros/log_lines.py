@@ -1,6 +1,7 @@
 """The node's log lines at start and end."""
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rclpy.node import Node
@@ -11,12 +12,24 @@ from .parameters.node_settings import NodeSettings
 if TYPE_CHECKING:
     from ..physics.simulation import Simulation
 
+MOST_DRIVEN = 3
+"""Bodies and robots whose topics the first line has."""
 
-def start_line(simulation: Simulation, settings: NodeSettings, node: Node) -> str:
-    """Scene, engine, with the reason if it is not the requested one, accuracy and topics."""
+
+def start_line(simulation: Simulation, settings: NodeSettings, node: Node,
+               body_topics: Callable[[str], list[str]]) -> str:
+    """Scene, engine, with the reason if it is not the requested one, accuracy and topics;
+    ``body_topics(name)``: those that move a body.
+    """
     scene, reason = simulation.scene, simulation.engine_reason
-    return (f'scene {scene.name}: {counted(len(scene.dolls), "doll")} of '
-            f'{counted(len(scene.bones), "bone")}, engine {simulation.engine_name}'
+    dolls = [placement.doll for placement in scene.dolls if placement.follow is None]
+    driven = ''.join(f', {name} moved by {" and ".join(body_topics(name))}'
+                     for name in scene.driven_names[:MOST_DRIVEN])
+    if len(scene.driven_names) > MOST_DRIVEN:
+        driven += f', and {len(scene.driven_names) - MOST_DRIVEN} more'
+    return (f'scene {scene.name}: {counted(len(dolls), "doll")} of '
+            f'{counted(sum(len(doll.bones) for doll in dolls), "bone")}{driven}, '
+            f'engine {simulation.engine_name}'
             + (f' (as {reason})' if reason else '')
             + f', accuracy {settings.accuracy}; poses on '
             f'{node.resolve_topic_name("~/poses")}, '

@@ -111,11 +111,13 @@ class RagdollNode(Node):
         self._event_log = EventLog(self)
         self.inputs = PushSubscriptions(self, self.input_counts)
         self.states = StateSubscription(self, self.input_counts, self._show_if_paused)
-        self.bodies = BodySubscriptions(self, self.input_counts, self._show_if_paused)
+        self.bodies = BodySubscriptions(self, self.input_counts, self._show_if_paused,
+                                        lambda: self.stamp)
         self.motors = MotorSubscriptions(self, self.input_counts)
         self.interactive = InteractiveMarkerServer(self, self.input_counts, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
-                                        self._diagnostic_values, self._diagnostics_stamp)
+                                        self._diagnostic_values, self._diagnostics_stamp,
+                                        self.bodies.topics)
         Services(self, self)
         self.simulation_interfaces = SimulationInterfaces(self, self, self._steady,
                                                           self._show_if_paused)
@@ -349,7 +351,8 @@ class RagdollNode(Node):
         self.interactive.set_simulation(simulation, self.settings, prepared.markers)
 
     def _log_start(self) -> None:
-        self.get_logger().info(start_line(self.simulation, self.settings, self))
+        self.get_logger().info(start_line(self.simulation, self.settings, self,
+                                          self.bodies.topics))
         if (overlaps := overlaps_text(self.simulation)) not in ('none', 'unknown'):
             self.get_logger().warning(f'overlaps at the start: {overlaps}')
 

@@ -17,11 +17,9 @@ from ....model.scene import SECOND, Scene
 from ....model.vectors import unit_vector
 from ...messages.tf import DEPTH, TFMessage
 from ...parameters.body_frames import parse_body_frames
+from .message_times import LONGEST
 
 TF, TF_STATIC = '/tf', '/tf_static'
-
-LONGEST_INTERVAL = 0.2
-"""s between two poses above which no velocity is taken from them: as long as a motion goes on."""
 
 CONNECTION_TIME = 1.0
 """s for which a frame may be without a connection to the world frame: its parents may come later.
@@ -29,8 +27,9 @@ CONNECTION_TIME = 1.0
 
 LATCHED = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
-Drive = Callable[[str, Sequence[float], Sequence[float]], None]
-"""Moves a body, by its name, pose (7,) and twist (6,) in the world frame; may raise a ModelError.
+Drive = Callable[[str, Sequence[float], Sequence[float], int], None]
+"""Moves a body, by its name, pose (7,) and twist (6,) in the world frame, and their stamp, ns; may
+raise a ModelError.
 """
 
 Refuse = Callable[[str, errors.ModelError], None]
@@ -55,7 +54,7 @@ class WorldPose(NamedTuple):
         not before this one.
         """
         seconds = 0.0 if last is None else (self.stamp - last.stamp) / SECOND
-        if last is None or not 0 < seconds <= LONGEST_INTERVAL:
+        if last is None or not 0 < seconds <= LONGEST:
             return np.zeros(6)
         turn = rotation.multiply(self.pose.orientation, rotation.inverse(last.pose.orientation))
         return np.concatenate([self.pose.position - last.pose.position,
@@ -129,7 +128,7 @@ class FrameFollower:
             return  # told again
         self._last[body] = now
         self._drive(body, (*pose.position.tolist(), *pose.orientation.tolist()),
-                    now.twist_since(last).tolist())
+                    now.twist_since(last).tolist(), stamp)
 
 
 class BodyFrames:

@@ -3,6 +3,7 @@ becomes drive_body().
 """
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -22,6 +23,7 @@ from ..input_counts import InputCounts
 from ..joint_values import joint_values
 from ..subscriptions import limited
 from .body_frames import BodyFrames
+from .message_times import MessageTimes, carried_on
 
 JOINTS = 'joint_states'
 
@@ -32,13 +34,19 @@ class BodySubscriptions:
 
     A pose is that of the body's frame in the world frame, whatever the message calls its frames: a
     robot's odometry has names of its own. Twists are along the body's axes, as nav_msgs and REP 103
-    have them. Those of a robot are its root link's. ``after`` is called when a body has been told
-    how to move.
+    have them. Those of a robot are its root link's. What a message with a stamp says is carried on
+    to the present, see message_times.py. ``after`` is called when a body has been told how to move;
+    ``now()`` is the stamp of the present state, ns.
     """
 
-    def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None]) -> None:
+    def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None],
+                 now: Callable[[], int]) -> None:
         self._node, self._counts, self._after = node, counts, after
-        self._subscriptions: list[Subscription] = []
+        self._times = MessageTimes(now)
+        self._unknown: set[tuple[str, str]] = set()
+        """Robots and joints that were named and do not exist."""
+        self._subscriptions: dict[str, list[Subscription]] = {}
+        """By the name of the body or robot."""
         self._names: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
         """Of all that is driven, and of robots."""
         self._frames = BodyFrames(node, self._drive_by_frame, counts.refuse)
@@ -51,17 +59,20 @@ class BodySubscriptions:
         names = scene.driven_names, tuple(robot.name for robot in scene.robots)
         if names == self._names:
             return
-        for subscription in self._subscriptions:
+        for subscription in itertools.chain(*self._subscriptions.values()):
             self._node.destroy_subscription(subscription)
         self._names = names
-        driven, robots = names
-        self._subscriptions = [
+        self._subscriptions = {name: [
             self._node.create_subscription(kind, f'{body_topic(name)}/{end}',
                                            partial(callback, name), 10)
-            for kind, end, callback, own in ((Odometry, 'odom', self.on_odometry, driven),
-                                             (Twist, 'cmd_vel', self.on_cmd_vel, driven),
-                                             (JointState, JOINTS, self.on_joint_states, robots))
-            for name in own]
+            for kind, end, callback, own in ((JointState, JOINTS, self.on_joint_states, names[1]),
+                                             (Odometry, 'odom', self.on_odometry, names[0]),
+                                             (Twist, 'cmd_vel', self.on_cmd_vel, names[0]))
+            if name in own] for name in names[0]}
+
+    def topics(self, name: str) -> list[str]:
+        """Topics that move a body or robot, as they are remapped."""
+        return [subscription.topic_name for subscription in self._subscriptions[name]]
 
     def configure(self, settings: NodeSettings) -> None:
         """Follow the frames that the settings name."""
@@ -75,7 +86,7 @@ class BodySubscriptions:
             orientation = unit_vector('pose.orientation', (q.x, q.y, q.z, q.w),
                                       'a quaternion x, y, z, w, not zero', 4)
             self._drive(source, name, (p.x, p.y, p.z, *orientation), orientation,
-                        message.twist.twist)
+                        message.twist.twist, self._times.lead(message.header.stamp))
         except errors.ModelError as error:
             self._counts.refuse(source, error)
 
@@ -83,31 +94,56 @@ class BodySubscriptions:
         """Move a body on from where it is; a message that is wrong is refused and counted."""
         source = f'{body_topic(name)}/cmd_vel'
         try:
-            self._drive(source, name, None, self.simulation.body_pose(name)[3:], message)
+            self._drive(source, name, None, self.simulation.body_pose(name)[3:], message, 0.0)
         except errors.ModelError as error:
             self._counts.refuse(source, error)
 
     def on_joint_states(self, name: str, message: JointState) -> None:
-        """Move joints of a robot on; a message that is wrong is refused and counted."""
+        """Move joints of a robot on; a message that is wrong is refused and counted. Names that are
+        not the robot's are left out, if others are: of a gripper, or a second arm.
+        """
         try:
             angles, rates = joint_values(message)
-            self.simulation.drive_body(name, joint_angles=angles, rates=rates)
+            known = {joint.name: joint.kind == 'continuous'
+                     for robot in self.simulation.scene.robots if robot.name == name
+                     for joint in robot.joints if joint.kind != 'fixed'}
+            if known.keys() & set(message.name):
+                self._note_unknown(name, [each for each in message.name if each not in known])
+                angles, rates = ({joint: value for joint, value in values.items() if joint in known}
+                                 for values in (angles, rates))
+            rates = rates or self._times.rates(name, message.header.stamp, angles, known)
+            lead = self._times.lead(message.header.stamp)
+            self.simulation.drive_body(name, rates=rates, joint_angles={
+                joint: angle + lead * rates.get(joint, 0.0) for joint, angle in angles.items()})
         except errors.ModelError as error:
             self._counts.refuse(f'{body_topic(name)}/{JOINTS}', error)
         else:
             self._after()
 
-    def _drive_by_frame(self, name: str, pose: Sequence[float], twist: Sequence[float]) -> None:
-        self.simulation.drive_body(name, pose, twist)
+    def _note_unknown(self, name: str, joints: list[str]) -> None:
+        """Log, once for each, joints that the robot of this name does not have."""
+        new = [joint for joint in joints if (name, joint) not in self._unknown]
+        if new:
+            self._unknown |= {(name, joint) for joint in new}
+            self._node.get_logger().warning(
+                f'{body_topic(name)}/{JOINTS}: {name} has no joint {", ".join(new)}: left out')
+
+    def _drive_by_frame(self, name: str, pose: Sequence[float], twist: Sequence[float],
+                        stamp: int) -> None:
+        self.simulation.drive_body(
+            name, carried_on(pose, twist, self._times.lead(stamp)), twist)
         self._after()
 
     def _drive(self, source: str, name: str, pose: Sequence[float] | None,
-               orientation: Sequence[float], twist: Twist) -> None:
-        """Move a body; ``orientation``: of the axes that the twist is along."""
+               orientation: Sequence[float], twist: Twist, lead: float) -> None:
+        """Move a body; ``orientation``: of the axes that the twist is along; ``lead``: s since the
+        pose.
+        """
         parts = [rotation.rotate(orientation, limited(
             self._counts, source, f'twist.{key}', getattr(twist, key), MAX_SPEED, 'the limit'))
             for key in ('linear', 'angular')]
-        self.simulation.drive_body(name, pose, [*parts[0].tolist(), *parts[1].tolist()])
+        moves = [*parts[0].tolist(), *parts[1].tolist()]
+        self.simulation.drive_body(name, pose and carried_on(pose, moves, lead), moves)
         self._after()
 
 

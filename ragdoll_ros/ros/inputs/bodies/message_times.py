@@ -1,0 +1,66 @@
+"""When a message's values are of: by its stamp, whatever its delay.
+
+A body reaches what it was told in one tick. If messages arrive now just before a tick and now just
+after it, a joint would turn at nothing for a tick and at twice its rate in the next, and hit so.
+What a message says is therefore carried on, at its rates, from its stamp to the present state's.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Time
+
+from ....model import rotation
+from ....model.scene import SECOND
+
+LONGEST = 0.2
+"""s between a stamp and the present, or between two stamps, above which they say nothing: as long
+as a motion goes on."""
+
+
+class MessageTimes:
+    """Times of the messages of each source. ``now()``: stamp of the present state, ns."""
+
+    def __init__(self, now: Callable[[], int]) -> None:
+        self._now = now
+        self._last: dict[str, tuple[int, Mapping[str, float]]] = {}
+        """Stamp, ns, and angles of the last message of joints, by source."""
+
+    def lead(self, stamp: Time | int) -> float:
+        """Time, s, from a stamp to the present state; 0 if there is no stamp, or one that is more
+        than LONGEST away, as of another clock.
+        """
+        stamp = stamp if isinstance(stamp, int) else stamp.sec * SECOND + stamp.nanosec
+        lead = (self._now() - stamp) / SECOND
+        return lead if stamp and abs(lead) <= LONGEST else 0.0
+
+    def rates(self, source: str, stamp: Time, angles: Mapping[str, float],
+              wraps: Mapping[str, bool]) -> dict[str, float]:
+        """Rates of the angles since the last message of a source, by their stamps; none without
+        one, or after more than LONGEST. ``wraps``: joints whose angles may.
+        """
+        now = stamp.sec * SECOND + stamp.nanosec
+        before, last = self._last.get(source, (0, {}))
+        self._last[source] = now, dict(angles)
+        seconds = (now - before) / SECOND
+        if not (before and 0 < seconds <= LONGEST):
+            return {}
+        return {name: _difference(angle, last[name], wraps.get(name, False)) / seconds
+                for name, angle in angles.items() if name in last}
+
+
+def _difference(angle: float, before: float, wraps: bool) -> float:
+    if wraps and math.isfinite(angle - before):
+        return math.remainder(angle - before, math.tau)
+    return angle - before
+
+
+def carried_on(pose: Sequence[float], twist: Sequence[float], seconds: float) -> list[float]:
+    """Pose (7,) that moves by a twist (6,), world frame, for some seconds."""
+    if not seconds:
+        return list(pose)
+    turn = rotation.from_rotation_vector(seconds * np.asarray(twist[3:]))
+    moved = np.add(pose[:3], seconds * np.asarray(twist[:3]))
+    return [*moved.tolist(), *rotation.multiply(turn, np.asarray(pose[3:])).tolist()]
