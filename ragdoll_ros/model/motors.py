@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -10,8 +11,7 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
-from .forward_kinematics import bone_motions
-from .ragdoll import Ragdoll
+from .ragdoll import Bone, Ragdoll, joint_axes
 
 MAX_STIFFNESS = 1e6
 """N m/rad and N m s/rad: a hundred times a person's, and far from loss of precision."""
@@ -98,16 +98,31 @@ def angle_inertias(doll: Ragdoll) -> dict[str, float]:
     """Moment of inertia, kg m^2, about each joint angle's axis, by its name, of all bones beyond
     the joint as one rigid body in the bind pose: a diagonal element of the mass matrix.
     """
+    # Mass, first and second moment about the doll's origin, of each bone with all beyond it.
+    beyond = {bone.name: _moments(bone) for bone in doll.bones}
+    for joint in reversed(doll.joints_from_root()):
+        beyond[joint.parent] = tuple(map(operator.add, beyond[joint.parent], beyond[joint.child]))
     found = {}
     for joint in doll.joints:
-        for name in () if joint.is_free_ball else joint.angle_names:
-            motions = bone_motions(doll, {}, {name: 1.0})
-            found[name] = sum(
-                bone.mass * float(np.dot(motion.velocity, motion.velocity))
-                + float(np.dot(bone.inertia, np.square(rotation.rotate(
-                    rotation.inverse(bone.orientation), motion.spin))))
-                for bone in doll.bones if (motion := motions[bone.name]).spin.any())
+        mass, first, second = beyond[joint.child]
+        at = np.array(joint.anchor)
+        # Steiner's theorem, from the origin to the anchor.
+        inertia = second + _spread(at, mass * at - 2 * first)
+        for name, axis in zip(joint.angle_names, joint_axes(joint), strict=True):
+            if not joint.is_free_ball:
+                found[name] = float(axis @ inertia @ axis)
     return found
+
+
+def _moments(bone: Bone) -> tuple[float, np.ndarray, np.ndarray]:
+    turn, center = rotation.matrix(np.array(bone.orientation)), np.array(bone.position)
+    return (bone.mass, bone.mass * center,
+            turn @ np.diag(bone.inertia) @ turn.T + bone.mass * _spread(center, center))
+
+
+def _spread(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Inertia about the origin of a unit point mass at a = b; bilinear and symmetric."""
+    return float(np.dot(a, b)) * np.eye(3) - (np.outer(a, b) + np.outer(b, a)) / 2
 
 
 def _checked(key: str, given: float | Mapping[str, float],
