@@ -194,7 +194,9 @@ class JointSprings:
 
     def go_limp(self, angles: Sequence[str] | None) -> None:
         """Remove the springs of these angles; None: of all."""
-        for angle in self._names if angles is None else angles:
+        if angles is None:
+            self._all.clear()
+        for angle in angles or ():
             self._index(angle)
             self._all.pop(angle, None)
         self._forget()
@@ -207,7 +209,7 @@ class JointSprings:
 
     def _angles(self, name: str) -> list[str]:
         """The angle of a name, or those of the joint above the bone of this name."""
-        if name in self._names:
+        if name in self._indices:
             return [name]
         bones = self._scene.bone_names
         if name not in bones:
@@ -225,7 +227,11 @@ class JointSprings:
             for placement in scene.dolls for joint in placement.doll.joints
             for axis in range(joint.dof)]
 
+    @cached_property
+    def _indices(self) -> dict[str, int]:
+        return {name: index for index, name in enumerate(self._names)}
+
     def _index(self, angle: str) -> int:
-        if angle not in self._names:
+        if angle not in self._indices:
             raise errors.UnknownJoint('angle', angle, errors.one_of(self._names, angle))
-        return self._names.index(angle)
+        return self._indices[angle]
