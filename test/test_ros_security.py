@@ -75,7 +75,8 @@ def test_the_policy_allows_what_the_node_does_and_no_more(make_node, given):
         'publish', 'subscribe'))
     patterns = {f'/ragdoll{pattern[1:]}' for pattern in PATTERNS}
     assert publish | {'/tf'} == publishable - patterns
-    assert hear | {'/clock'} == hearable - patterns  # use_sim_time's
+    # Those of use_sim_time and body_frames.
+    assert hear | {'/clock', '/tf', '/tf_static'} == hearable - patterns
     standard = {f'/ragdoll/{snake_case(name)}'  # where simulation_interfaces is installed
                 for services in (SimulationServices, EntityServices, SpawnServices)
                 for name in services.FEATURES}
