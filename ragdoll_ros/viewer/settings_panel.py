@@ -18,9 +18,9 @@ from .widgets import parsing
 from .widgets.error_text import error_text
 from .widgets.form import GREY, RED, Field, Form, colored
 
-ERRORS_MM = {'rigid': {'draft': 0.69, 'normal': 0.38, 'exact': 0.04},
-             'bullet': {'draft': 9, 'normal': 6, 'exact': 7},
-             'mujoco': {'draft': 13, 'normal': 9, 'exact': 7}}
+ERRORS_MM = {'rigid': {'draft': 0.62, 'normal': 0.39, 'exact': 0.03},
+             'bullet': {'draft': 10, 'normal': 5, 'exact': 7},
+             'mujoco': {'draft': 14, 'normal': 8, 'exact': 7}}
 """Position error of the default doll's bones after 0.1 s of contacts, median of 60 pieces, for
 each engine: docs/accuracy.md, 'pieces'. The finest of PyBullet and MuJoCo there has 32 substeps."""
 
