@@ -370,8 +370,12 @@ class Scene:
     @cached_property
     def angle_names(self) -> tuple[str, ...]:
         """Names of all joint angles, doll by doll in the order of their joints."""
-        return tuple(self.qualified(placement, name) for placement in self.dolls
-                     for joint in placement.doll.joints for name in joint.angle_names)
+        return tuple(name for placement in self.dolls for name in self.angle_names_of(placement))
+
+    def angle_names_of(self, placement: Placement) -> list[str]:
+        """Names of the joint angles of a doll of the scene, in the order of its joints."""
+        return [self.qualified(placement, name)
+                for joint in placement.doll.joints for name in joint.angle_names]
 
     def __repr__(self) -> str:
         ground = 'over the ground' if self.ground else 'without ground'

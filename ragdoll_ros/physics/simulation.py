@@ -807,9 +807,7 @@ class Simulation:
         """Names of the joint angles of a doll; None: of all."""
         if doll is None:
             return self.scene.angle_names
-        placement = self.scene.dolls[doll]
-        return [self.scene.qualified(placement, name) for joint in placement.doll.joints
-                for name in joint.angle_names]
+        return self.scene.angle_names_of(self.scene.dolls[doll])
 
     def _with_given(self, doll: int, key: str, given: Mapping[str, float],
                     values: np.ndarray) -> np.ndarray:

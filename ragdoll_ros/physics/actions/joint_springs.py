@@ -157,9 +157,7 @@ class JointSprings:
 
     def follow(self, doll: int, angles: np.ndarray, rates: np.ndarray, time: int) -> None:
         """Let a doll's targets be at ``angles`` (k,) rad, and move on at ``rates`` (k,)."""
-        placement = self._scene.dolls[doll]
-        names = (self._scene.qualified(placement, name) for joint in placement.doll.joints
-                 for name in joint.angle_names)
+        names = self._scene.angle_names_of(self._scene.dolls[doll])
         for name, angle, rate in zip(names, angles.tolist(), rates.tolist(), strict=True):
             if name in self._all:
                 self._all[name] = self._all[name].aimed(angle, rate, TIMEOUT / SECOND, time)
@@ -177,13 +175,9 @@ class JointSprings:
     def changed(self, change: SceneChange) -> JointSprings:
         """Those on dolls that stay, in the scene after, with those of dolls that come."""
         after = JointSprings(change.after)
-        stay = {change.after.dolls[doll].name
-                for doll, old in enumerate(change.old_dolls.tolist()) if old >= 0}
-        for placement in change.after.dolls:
-            if placement.name in stay:
-                for joint in placement.doll.joints:
-                    for name in joint.angle_names:
-                        after._all.pop(change.after.qualified(placement, name), None)
+        for placement, old in zip(change.after.dolls, change.old_dolls, strict=True):
+            for name in change.after.angle_names_of(placement) if old >= 0 else ():
+                after._all.pop(name, None)
         names = change.angle_names if self._all else {}
         after._all |= {
             names[angle]: dataclasses.replace(each, full=dataclasses.replace(

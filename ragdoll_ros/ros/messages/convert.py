@@ -14,7 +14,7 @@ from sensor_msgs.msg import Imu, JointState, MultiDOFJointState
 from std_msgs.msg import Header
 
 from ...model import rotation
-from ...model.scene import Scene
+from ...model.scene import SECOND, Scene
 from ...model.state import State
 from ...physics.swing.pose import SwingState
 
@@ -52,6 +52,11 @@ def to_time(nanoseconds: int) -> Time:
     """Time from ns."""
     seconds, nanoseconds = divmod(nanoseconds, 1_000_000_000)
     return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def from_time(stamp: Time) -> int:
+    """Nanoseconds of a Time."""
+    return stamp.sec * SECOND + stamp.nanosec
 
 
 def to_duration(nanoseconds: int) -> Duration:

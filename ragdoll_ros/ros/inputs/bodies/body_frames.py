@@ -15,6 +15,7 @@ from ....model import errors, rotation
 from ....model.pose import Pose
 from ....model.scene import SECOND, Scene
 from ....model.vectors import unit_vector
+from ...messages.convert import from_time
 from ...messages.tf import DEPTH, TFMessage
 from ...parameters.body_frames import parse_body_frames
 from .message_times import LONGEST
@@ -172,4 +173,4 @@ def _transform(message: TransformStamped) -> Transform:
     orientation = unit_vector('rotation', (turn.x, turn.y, turn.z, turn.w),
                               'a quaternion x, y, z, w, not zero', 4)
     return Transform(message.header.frame_id, Pose(np.array(position), np.array(orientation)),
-                     stamp.sec * SECOND + stamp.nanosec)
+                     from_time(stamp))

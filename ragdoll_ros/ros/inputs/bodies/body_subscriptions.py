@@ -18,6 +18,7 @@ from ....model import errors, rotation
 from ....model.drive import MAX_SPEED
 from ....model.vectors import unit_vector
 from ....physics.simulation import Simulation
+from ...messages.convert import from_time
 from ...parameters.node_settings import NodeSettings
 from ..input_counts import InputCounts
 from ..joint_values import joint_values
@@ -86,7 +87,7 @@ class BodySubscriptions:
             orientation = unit_vector('pose.orientation', (q.x, q.y, q.z, q.w),
                                       'a quaternion x, y, z, w, not zero', 4)
             self._drive(source, name, (p.x, p.y, p.z, *orientation), orientation,
-                        message.twist.twist, self._times.lead(message.header.stamp))
+                        message.twist.twist, self._times.lead(from_time(message.header.stamp)))
         except errors.ModelError as error:
             self._counts.refuse(source, error)
 
@@ -111,8 +112,9 @@ class BodySubscriptions:
                 self._note_unknown(name, [each for each in message.name if each not in known])
                 angles, rates = ({joint: value for joint, value in values.items() if joint in known}
                                  for values in (angles, rates))
-            rates = rates or self._times.rates(name, message.header.stamp, angles, known)
-            lead = self._times.lead(message.header.stamp)
+            stamp = from_time(message.header.stamp)
+            rates = rates or self._times.rates(name, stamp, angles, known)
+            lead = self._times.lead(stamp)
             self.simulation.drive_body(name, rates=rates, joint_angles={
                 joint: angle + lead * rates.get(joint, 0.0) for joint, angle in angles.items()})
         except errors.ModelError as error:

@@ -10,12 +10,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from builtin_interfaces.msg import Time
 
 from ....model import rotation
 from ....model.scene import SECOND
+from ....physics.actions.body_motion import TIMEOUT
 
-LONGEST = 0.2
+LONGEST = TIMEOUT / SECOND
 """s between a stamp and the present, or between two stamps, above which they say nothing: as long
 as a motion goes on."""
 
@@ -28,23 +28,21 @@ class MessageTimes:
         self._last: dict[str, tuple[int, Mapping[str, float]]] = {}
         """Stamp, ns, and angles of the last message of joints, by source."""
 
-    def lead(self, stamp: Time | int) -> float:
-        """Time, s, from a stamp to the present state; 0 if there is no stamp, or one that is more
-        than LONGEST away, as of another clock.
+    def lead(self, stamp: int) -> float:
+        """Time, s, from a stamp, ns, to the present state; 0 if there is no stamp, or one that is
+        more than LONGEST away, as of another clock.
         """
-        stamp = stamp if isinstance(stamp, int) else stamp.sec * SECOND + stamp.nanosec
         lead = (self._now() - stamp) / SECOND
         return lead if stamp and abs(lead) <= LONGEST else 0.0
 
-    def rates(self, source: str, stamp: Time, angles: Mapping[str, float],
+    def rates(self, source: str, stamp: int, angles: Mapping[str, float],
               wraps: Mapping[str, bool]) -> dict[str, float]:
-        """Rates of the angles since the last message of a source, by their stamps; none without
+        """Rates of the angles since the last message of a source, by their stamps, ns; none without
         one, or after more than LONGEST. ``wraps``: joints whose angles may.
         """
-        now = stamp.sec * SECOND + stamp.nanosec
         before, last = self._last.get(source, (0, {}))
-        self._last[source] = now, dict(angles)
-        seconds = (now - before) / SECOND
+        self._last[source] = stamp, dict(angles)
+        seconds = (stamp - before) / SECOND
         if not (before and 0 < seconds <= LONGEST):
             return {}
         return {name: _difference(angle, last[name], wraps.get(name, False)) / seconds

@@ -23,6 +23,7 @@ from ....model.state import State
 from ....physics.sensors.impact_arrow import ImpactArrow
 from ....recordings.recording import Rods
 from ....ros.impacts.markers import to_arrows
+from ....ros.messages.convert import from_time
 from ....ros.messages.measures import TickMeasures, deserialize_measures
 from ....ros.messages.serialized import deserialize_pose_array
 from ..recent_impacts import RecentImpacts
@@ -59,7 +60,7 @@ def _angles(message: JointState, scene: Scene | None) -> tuple[int, np.ndarray]:
     if scene is None or tuple(message.name) != scene.angle_names:
         raise ValueError('joints of another scene')
     stamp = message.header.stamp
-    return stamp.sec * SECOND + stamp.nanosec, np.array(message.position)
+    return from_time(stamp), np.array(message.position)
 
 
 def _impacts(message: MarkerArray, _: Scene | None) -> tuple[int, tuple[ImpactArrow, ...]]:
@@ -67,7 +68,7 @@ def _impacts(message: MarkerArray, _: Scene | None) -> tuple[int, tuple[ImpactAr
     if not arrows:
         raise ValueError('no arrows')
     stamp = message.markers[0].header.stamp
-    return stamp.sec * SECOND + stamp.nanosec, arrows
+    return from_time(stamp), arrows
 
 
 TOPICS = {'poses': Topic(PoseArray, '{}/poses', lambda data, _: deserialize_pose_array(data),
