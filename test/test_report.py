@@ -275,6 +275,25 @@ def test_page_and_pictures_come_from_the_json_alone(tmp_path):
         assert (tmp_path / picture).stat().st_size > 5000
 
 
+NEW = [{'failed': 'E: y', 'at': 'f.py:2', 'job': 'new'}]
+
+
+def test_a_part_is_replaced_and_the_others_stay(tmp_path, monkeypatch):
+    """The page names both runs; what is no whole part is refused before anything runs."""
+    about = figures.about('ragdoll_report', 1.0, False, 100)
+    costs = [{'scene': 'empty', 'method': 'ours-normal', 'tick_s': 1e-6}]
+    figures.save({'about': about, 'figures': {
+        'hard': [{'failed': 'E: x', 'at': 'f.py:1', 'job': 'old'}], 'costs': costs}}, tmp_path)
+    monkeypatch.setattr(command, 'run_jobs', lambda jobs: {'hard': NEW})
+    assert command.main(['--case', 'hard', '--update', '--out', str(tmp_path)]) == 0
+    data = figures.load(tmp_path)
+    assert data['figures'] == {'hard': NEW, 'costs': costs}
+    assert data['about']['command'] == 'ragdoll_report'
+    assert data['about']['updated']['hard']['command'] == 'ragdoll_report --case hard'
+    assert 'Measured again by `ragdoll_report --case hard` on ' in (
+        tmp_path / 'accuracy.md').read_text()
+
+
 def test_an_empty_run_still_has_a_head():
     about = figures.about('ragdoll_report', 1.0, False, 100)
     assert markdown({'about': about, 'figures': {}}, {}).startswith('# Speed against error')
@@ -283,7 +302,9 @@ def test_an_empty_run_still_has_a_head():
 
 @pytest.mark.parametrize(('arguments', 'text'), [
     (['--case', 'nonsense'], 'precision'), (['--starts', '0'], '1 or more'),
-    (['--out', '/proc/nowhere'], '/proc/nowhere'), (['--from-json', '--out', '/tmp'], 'no /tmp')])
+    (['--out', '/proc/nowhere'], '/proc/nowhere'), (['--from-json', '--out', '/tmp'], 'no /tmp'),
+    (['--case', 'hard', '--update', '--out', '/tmp'], 'no /tmp'),
+    (['--case', 'free_fall', '--update', '--out', 'docs'], 'free_fall: expected whole parts')])
 def test_a_wrong_call_is_told_and_ends_with_2(arguments, text, capsys):
     assert command.main(arguments) == 2
     assert text in capsys.readouterr().err

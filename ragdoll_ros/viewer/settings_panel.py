@@ -18,11 +18,11 @@ from .widgets import parsing
 from .widgets.error_text import error_text
 from .widgets.form import GREY, RED, Field, Form, colored
 
-ERRORS_MM = {'rigid': {'draft': 0.62, 'normal': 0.39, 'exact': 0.03},
-             'bullet': {'draft': 10, 'normal': 5, 'exact': 7},
-             'mujoco': {'draft': 14, 'normal': 8, 'exact': 7}}
-"""Position error of the default doll's bones after 0.1 s of contacts, median of 60 pieces, for
-each engine: docs/accuracy.md, 'pieces'. The finest of PyBullet and MuJoCo there has 32 substeps."""
+ERRORS_MM = {'rigid': {'draft': 0.5, 'normal': 0.29, 'exact': 0.03},
+             'bullet': {'draft': 7, 'normal': 5, 'exact': 4},
+             'mujoco': {'draft': 11, 'normal': 8, 'exact': 8}}
+"""Position error of the default doll's bones after 0.1 s of contacts, median of 240
+segments, for each engine: docs/accuracy.md, 'pieces'. The finest of PyBullet and MuJoCo there has 32 substeps."""
 
 FIELDS = (
     Field('gravity', 'Gravity, m/s²', 'vector', 'Along x, y, z; z is up'),

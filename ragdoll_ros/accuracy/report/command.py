@@ -69,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
         'compared with PyBullet and MuJoCo, and with DART and Drake where they are installed. '
         'Writes accuracy.json, accuracy.md and pictures.',
         epilog='example: ragdoll_report --quick --out /tmp/report; '
-        'ragdoll_report --case classes --starts 300')
+        'ragdoll_report --case classes --starts 300; ragdoll_report --case pieces --update')
     made.add_argument('--quick', action='store_true',
                       help='fewer motions, methods and starts: at most 90 s (else 60 min)')
     made.add_argument('--case', action='append', metavar='NAME', default=[],
@@ -78,6 +78,9 @@ def parser() -> argparse.ArgumentParser:
                       help='starts of each of the nine classes (100)')
     made.add_argument('--out', type=Path, metavar='DIR', help='output folder (docs; with --case '
                       'build/report, so that the published page stays complete)')
+    made.add_argument('--update', action='store_true',
+                      help='with --case: replace these parts in DIR/accuracy.json (docs) and leave '
+                      'the others as they are')
     made.add_argument('--from-json', action='store_true',
                       help='run nothing, rewrite page and pictures from DIR/accuracy.json')
     return made
@@ -88,19 +91,37 @@ def report(options: argparse.Namespace) -> int:
     if options.case == ['list']:
         sys.stdout.write('\n'.join(labels()) + '\n')
         return 0
-    options.out = options.out or Path('build/report' if options.case else 'docs')
+    apart = options.case and not options.update
+    options.out = options.out or Path('build/report' if apart else 'docs')
     folder = options.out.absolute()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise WrongCall(f'--out {options.out}: {error.strerror}') from None
     if options.from_json:
-        if not (folder / figures.FILE).is_file():
-            raise WrongCall(f'--from-json: there is no {folder / figures.FILE}')
+        written('--from-json', folder)
+    elif options.update:
+        figures.save(updated(written('--update', folder), options), folder)
     else:
         figures.save(measured(options), folder)
     write(folder)
     return 0
+
+
+def written(option: str, folder: Path) -> dict:
+    """Data of an earlier report, which an option needs."""
+    if not (folder / figures.FILE).is_file():
+        raise WrongCall(f'{option}: there is no {folder / figures.FILE}')
+    return figures.load(folder)
+
+
+def updated(data: dict, options: argparse.Namespace) -> dict:
+    """Data of a report in which whole parts are measured again."""
+    single = [name for name in options.case if name not in PARTS]
+    if single or not options.case:
+        raise WrongCall(f'--update: {single[0] if single else "no --case"}: expected whole parts, '
+                        f'--case of {", ".join(PARTS)}')
+    return figures.merged(data, measured(options))
 
 
 def measured(options: argparse.Namespace) -> dict:

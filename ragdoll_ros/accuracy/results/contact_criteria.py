@@ -74,12 +74,20 @@ def _segment(row: Row, accuracy: str, base: float | None) -> Iterator[Row]:
     found = 1e3 * number(row['position_median_m']), 1e3 * number(row['position_p90_m'])
     yield criterion(f'short segments through contacts{name}',
                     f'median at most {median:g} mm, 90 % at most {most:g} mm',
-                    f'{found[0]:.2f} mm, {found[1]:.2f} mm',
+                    f'{found[0]:.2f} mm, {found[1]:.2f} mm{_uncertainty(row)}',
                     found[0] <= median and found[1] <= most)
     if base:
         over = number(row['cpu_s_per_s']) / base
         yield criterion(f'CPU of segments over PyBullet N = 10{name}', f'at most {ratio:g}',
                         f'{over:.2f}', over <= ratio)
+
+
+def _uncertainty(row: Row) -> str:
+    """Standard errors of median and 90th percentile, if the row has them."""
+    if 'position_p90_se_m' not in row:
+        return ''
+    median, most = (1e3 * number(row[f'position_{name}_se_m']) for name in ('median', 'p90'))
+    return f' (standard errors {median:.2f}, {most:.2f})'
 
 
 def _law(row: Row) -> str:

@@ -50,6 +50,13 @@ def load(folder: Path) -> dict:
     return json.loads((folder / FILE).read_text(encoding='utf-8'))
 
 
+def merged(data: dict, newer: dict) -> dict:
+    """A report's data with the parts of a newer run, whose conditions are kept beside its own."""
+    parts = newer['figures']
+    later = {**data['about'].get('updated', {}), **dict.fromkeys(parts, newer['about'])}
+    return {'about': {**data['about'], 'updated': later}, 'figures': {**data['figures'], **parts}}
+
+
 def number(value: object) -> float:
     """A figure of the JSON as a float."""
     return math.nan if value is None else float(value)
