@@ -21,8 +21,8 @@ from .widgets.form import GREY, RED, Field, Form, colored
 ERRORS_MM = {'rigid': {'draft': 0.5, 'normal': 0.29, 'exact': 0.03},
              'bullet': {'draft': 7, 'normal': 5, 'exact': 4},
              'mujoco': {'draft': 11, 'normal': 8, 'exact': 8}}
-"""Position error of the default doll's bones after 0.1 s of contacts, median of 240
-segments, for each engine: docs/accuracy.md, 'pieces'. The finest of PyBullet and MuJoCo there has 32 substeps."""
+"""Position error of the default doll's bones after 0.1 s of contacts, median of 240 segments, for
+each engine: docs/accuracy.md, 'pieces'. `exact` of PyBullet and MuJoCo is that of 32 substeps."""
 
 FIELDS = (
     Field('gravity', 'Gravity, m/s²', 'vector', 'Along x, y, z; z is up'),
