@@ -97,8 +97,9 @@ def _add_doll(world: ET.Element, scene: Scene, placement: Placement) -> None:
     doll = placement.doll
     made = {doll.root.name: _add_bone(world, scene, placement, doll.root,
                                       placement.bone_pose(doll.root))}
-    ET.SubElement(made[doll.root.name], 'freejoint',
-                  name=scene.qualified(placement, doll.root.name) + '/free')
+    if not placement.fixed_root:
+        ET.SubElement(made[doll.root.name], 'freejoint',
+                      name=scene.qualified(placement, doll.root.name) + '/free')
     for joint in doll.joints_from_root():
         parent, child = doll.bone(joint.parent), doll.bone(joint.child)
         body = _add_bone(made[parent.name], scene, placement, child,

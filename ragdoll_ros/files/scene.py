@@ -167,6 +167,8 @@ def scene_data(scene: Scene, folder: Path | None = None,
                               for angle, value in values.items()}
         if placement.follow:
             entry['follow'] = follow_data(placement.follow)
+        if placement.fixed_root:
+            entry['fixed_root'] = True
         if placement.motors:
             entry['motors'] = _motors_data(placement.motors)
         if placement.animation:
@@ -192,7 +194,7 @@ def _copies(doll: Ragdoll, entry: dict, folder: Path) -> list[Placement]:
 
 def _placement(doll: Ragdoll, entry: dict) -> Placement:
     """The doll as an entry of the scene places it; errors of angles are in degrees."""
-    keys = 'position', 'orientation', 'velocity', 'spin', 'name'
+    keys = 'position', 'orientation', 'velocity', 'spin', 'name', 'fixed_root'
     fields: dict[str, Any] = {key: entry[key] for key in keys if key in entry}
     for name, key in ANGLE_KEYS.items():
         fields[name] = {angle: math.radians(value) for angle, value in entry.get(key, {}).items()}

@@ -116,11 +116,14 @@ class Placement:
             are its own.
         motors: what drives the joints to the initial pose, or, beside an animation, to its poses,
             while the root is free; None: nothing.
+        fixed_root: whether the root stays where it is, attached to the world, whatever acts on it:
+            a lamp that hangs, a door, a robot's arm.
 
     Raises:
         NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none; for ``follow`` of a
-            doll of several bones, or with a velocity of what follows exactly; for a spin, angles,
-            rates or ``follow`` beside an animation, or an animation of another doll.
+            doll of several bones, or with a velocity of what follows exactly or of a fixed root;
+            for a spin, angles, rates or ``follow`` beside an animation, or an animation of another
+            doll; for an animation or ``follow`` of a fixed root.
         UnknownJoint, OutOfRange: for an angle that the doll does not have, or outside its limits.
 
     Example:
@@ -139,6 +142,7 @@ class Placement:
     follow: Follow | None = None
     animation: Playback | None = field(default=None, hash=False)
     motors: Motors | None = None
+    fixed_root: bool = False
 
     def __post_init__(self) -> None:
         for key in ('position', 'velocity', 'spin'):
@@ -153,6 +157,8 @@ class Placement:
             if any(getattr(self, key)):
                 raise errors.WrongForm(key, getattr(self, key), 'none: what follows exactly stands '
                                        'until drive_body() moves it')
+        if self.fixed_root:
+            self._check_fixed_root()
         if self.animation is not None:
             self._check_animation(self.animation)
         if self.motors is not None:
@@ -201,11 +207,22 @@ class Placement:
 
     def root_velocity(self) -> np.ndarray:
         """Initial velocity (3,) m/s of the root's centre of mass, world frame."""
+        if self.fixed_root:
+            return np.zeros(3)
         arm = rotation.rotate(self.orientation, self.doll.root.position - self.mass_centre)
         moved = self.velocity + np.cross(self.spin, arm)
         if self.rates:
             moved -= rotation.rotate(self.orientation, self._mean('velocity'))
         return moved
+
+    def _check_fixed_root(self) -> None:
+        for key in ('velocity', 'spin'):
+            if any(getattr(self, key)):
+                raise errors.WrongForm(key, getattr(self, key), 'none: the root is fixed')
+        for key in ('follow', 'animation'):
+            if getattr(self, key) is not None:
+                raise errors.WrongForm(key, getattr(self, key), 'none: the root is fixed; motors '
+                                       'move the joints')
 
     def _check_animation(self, animation: Playback) -> None:
         for key in ('spin', 'angles', 'rates'):
@@ -366,6 +383,16 @@ class Scene:
         """(n,) index into ``dolls`` of each bone."""
         counts = [own.stop - own.start for own in self.bone_slices]
         return np.repeat(np.arange(len(counts)), counts)
+
+    @cached_property
+    def yielding_bones(self) -> np.ndarray:
+        """(n,) which bones forces move: not those of bodies that follow exactly, nor fixed roots."""
+        yields = np.array([not placement.is_kinematic for placement in self.dolls])[
+            self.doll_of_bone]
+        for own, placement in zip(self.bone_slices, self.dolls, strict=True):
+            if placement.fixed_root:
+                yields[own.start + placement.doll.bones.index(placement.doll.root)] = False
+        return yields
 
     @cached_property
     def angle_names(self) -> tuple[str, ...]:

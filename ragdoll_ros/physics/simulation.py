@@ -611,7 +611,8 @@ class Simulation:
         Raises:
             UnknownDoll, UnknownJoint: the scene has no such doll, or the doll no such angle.
             NotFinite, NotUnit, WrongForm, OutOfRange: for a vector or quaternion that is none, a
-                position that is too far away, an angle outside its limits, or a robot's link.
+                position that is too far away, an angle outside its limits, the velocity of a root
+                that is fixed, or a robot's link.
 
         >>> simulation.set_state('doll', velocity=(0, 0, 2)).linear_velocities[0].round(6).tolist()
         [0.0, 0.0, 2.0]
@@ -619,6 +620,9 @@ class Simulation:
         index, layout = self._doll_index(doll), self._engine.layout
         if (robot := self.scene.robot_of_body.get(doll)) is not None:
             raise errors.WrongForm('doll', doll, f'none: drive_body() moves the robot {robot}')
+        for name, given in (('velocity', velocity), ('spin', spin)):
+            if self.scene.dolls[index].fixed_root and given is not None and any(given):
+                raise errors.WrongForm(name, given, f'none: the root of {doll} is fixed')
         self._release([index], 'set_state')
         here = self._engine.coordinates
         for values, own, name, given, checked in (
@@ -855,7 +859,7 @@ class Simulation:
         detector, self._sleep_detector = self._sleep_detector, prepared.sleep_detector
         self._sleep_detector.continue_from(detector, change)
         self._stability_test = prepared.stability_test
-        for name in ('_gap', '_heights', '_yields'):
+        for name in ('_gap', '_heights'):
             self.__dict__.pop(name, None)
         before, self._swings = self._swings, prepared.swings
         if self._swings and before:
@@ -955,18 +959,12 @@ class Simulation:
                        engine.doll_totals.kinetic)
         return unstable
 
-    @cached_property
-    def _yields(self) -> np.ndarray:
-        """(n,) bones that are not of bodies that follow exactly."""
-        kinematic = np.array([placement.is_kinematic for placement in self.scene.dolls])
-        return ~kinematic[self.scene.doll_of_bone]
-
     @property
     def _resting(self) -> np.ndarray:
-        """(n,) bones that the ground bears: neither bodies that follow exactly nor animated."""
+        """(n,) bones that the ground bears: those that yield and are not animated."""
         if not self._animations:
-            return self._yields
-        return self._yields & ~np.isin(self.scene.doll_of_bone, self._animations.kinematic)
+            return self.scene.yielding_bones
+        return self.scene.yielding_bones & ~np.isin(self.scene.doll_of_bone, self._animations.kinematic)
 
     @cached_property
     def _gap(self) -> JointGap:
@@ -988,6 +986,8 @@ def _needed(scene: Scene) -> Iterator[Capability]:
         yield Capability.PASSIVE_TORQUES
     if any(placement.follow for placement in scene.dolls):
         yield Capability.DRIVEN_BODIES
+    if any(placement.fixed_root for placement in scene.dolls):
+        yield Capability.FIXED_ROOTS
     if any(placement.motors for placement in scene.dolls):
         yield Capability.JOINT_SPRINGS
     if any(isinstance(body.shape, Surface) for body in scene.bodies):

@@ -13,6 +13,7 @@ class Capability(Enum):
     JOINT_SPRINGS = 'has joint springs'
     PASSIVE_TORQUES = 'has passive joint torques'
     DRIVEN_BODIES = 'moves bodies with follow'
+    FIXED_ROOTS = 'holds roots that are fixed'
     SURFACES = 'has meshes and height fields'
     SCENE_CHANGES = 'adds and removes dolls while it runs'
     OVERLAPS = 'finds overlaps'

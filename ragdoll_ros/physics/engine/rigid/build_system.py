@@ -11,7 +11,7 @@ from ....model.coordinates import DofLayout
 from ....model.ragdoll import Bone, Joint, Ragdoll, joint_axes
 from ....model.scene import Placement, Scene
 from ...kernels.collision.shapes import SHAPE_KIND
-from ...kernels.dynamics.body import BODY
+from ...kernels.dynamics.body import BODY, FIXED, MOVED
 from ...kernels.system import (GEOM, GEOM_PAIR, JOINT_LIMIT, NO_SLIP, System, coordinate_count)
 from ...rigid_body import damping_rate
 
@@ -65,7 +65,8 @@ def _kinematic_tree(scene: Scene) -> np.ndarray:
             body['mass'], body['inertia'] = bone.mass, bone.inertia
             body['inertial_orientation'] = bone.orientation
             body['q_start'], body['v_start'] = q, v
-            body['kinematic'] = placement.is_kinematic
+            body['kinematic'] = (MOVED if placement.is_kinematic
+                                 else FIXED if placement.fixed_root and joint is None else 0)
             at[bone.name] = len(bodies)
             bodies.append(body)
             if joint is None:

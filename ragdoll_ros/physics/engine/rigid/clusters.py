@@ -16,7 +16,7 @@ from ...accuracy import Accuracy
 from ...kernels.cluster_state import IMPACT, LEDGER, STEP_STATS, ClusterState, make_cluster_state
 from ...kernels.compiling.bundle import bind
 from ...kernels.contact_kind import LIMIT
-from ...kernels.dynamics.body import WORLD
+from ...kernels.dynamics.body import MOVED, WORLD
 from ...kernels.loaded import advance as kernels
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, KINEMATIC, OVERLAPPING, System
 from ...kernels.workspace import Workspace, make_workspace
@@ -100,9 +100,15 @@ class Clusters:
         self._systems, self._laws = _each_doll(scene, like)
         self.kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
         """(d,) dolls that move at their velocities, whatever acts on them."""
+        self.fixed_roots = np.array([placement.fixed_root for placement in scene.dolls])
+        """(d,) dolls whose roots stay where they are."""
         self._q = [np.arange(own.start, own.stop) for own in layout.doll_q]
         self._v = [np.arange(own.start, own.stop) for own in layout.doll_v]
         self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
+        self._fixed_v = np.zeros(len(self._doll_of_v), bool)
+        """(nv,) those of fixed roots."""
+        for doll in np.flatnonzero(self.fixed_roots):
+            self._fixed_v[self._v[doll][:6]] = True
         self._bones = [np.arange(own.start, own.stop) for own in scene.bone_slices]
         self._shared: dict[int, tuple[list[Workspace], list[list[np.ndarray]]]] = {}
         """Of each system by its id: the workspaces that equal dolls share, and what binds both."""
@@ -208,9 +214,9 @@ class Clusters:
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
         """Set the velocities of ``dolls`` (d,), whole clusters, to those in ``velocities``, but for
-        those of kinematic ones.
+        those of kinematic ones and of fixed roots.
         """
-        own = (dolls & ~self.kinematic)[self._doll_of_v]
+        own = (dolls & ~self.kinematic)[self._doll_of_v] & ~self._fixed_v
         self.v[own] = velocities[own]
         self._states.arrays['dense_step'][dolls] = 0
         for cluster in self._joined:
@@ -248,7 +254,7 @@ class Clusters:
         cluster, single = self.members[self.of_doll[doll]], self._singles[doll]
         for one in {id(each): each for each in (single, cluster)}.values():
             system, place = one.system, int(np.searchsorted(one.dolls, doll))
-            system.tree['kinematic'][system.body_doll == place] = kinematic
+            system.tree['kinematic'][system.body_doll == place] = MOVED if kinematic else 0
             own = system.geoms[system.geoms['body'] != WORLD]
             if not system.tree['kinematic'].all():
                 system.energy_scale[:] = energy_scale(system.tree, own, system.gravity)
@@ -743,7 +749,8 @@ def _keys(scene: Scene) -> list[tuple[object, ...]]:
     """What determines the system of each doll in a scene. An animated one's changes when it goes
     limp: no other doll has the same, nor has the same doll in another scene.
     """
-    return [(id(placement.doll), placement.is_kinematic) if not placement.is_animated
+    return [(id(placement.doll), placement.is_kinematic, placement.fixed_root)
+            if not placement.is_animated
             else (id(placement.doll), placement.name, id(scene)) for placement in scene.dolls]
 
 

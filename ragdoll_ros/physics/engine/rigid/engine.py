@@ -250,7 +250,7 @@ class RigidEngine:
         found = np.zeros(len(self.scene.dolls), bool)
         on = (bones[:, 1] == GROUND) & (contacts['impulse'][:, 0] > 0)
         found[self.scene.doll_of_bone[bones[on, 0]]] = True
-        return found | self._kinematic
+        return found | self._kinematic | self._clusters.fixed_roots
 
     def contacts(self) -> Contacts:
         found, touching, dt = self._clusters.contacts()
@@ -430,7 +430,8 @@ class RigidEngine:
             return
         depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
-        sunk = (depths > allowed_penetration(self.scene)) & ~self._kinematic
+        sunk = (depths > allowed_penetration(self.scene)) & ~(
+            self._kinematic | self._clusters.fixed_roots)
         for doll in (doll for doll in dolls if sunk[doll]):
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)

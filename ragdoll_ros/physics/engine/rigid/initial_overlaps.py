@@ -68,7 +68,7 @@ def _depths(scene: Scene, clusters: Clusters, broad_phase: BroadPhase,
 def _overlapping(scene: Scene, clusters: Clusters) -> Iterator[tuple[Pair, float]]:
     """What overlaps, and the depth, m, of each pair of geoms."""
     heights = GroundHeights(scene)(State.of(clusters.bone_states))
-    for bone in np.flatnonzero(heights < -TOLERANCE).tolist():
+    for bone in np.flatnonzero((heights < -TOLERANCE) & scene.yielding_bones).tolist():
         yield (bone, GROUND), -float(heights[bone])
     for cluster in clusters.members:
         pairs = cluster.system.pairs

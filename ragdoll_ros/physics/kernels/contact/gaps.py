@@ -60,8 +60,8 @@ NONE = -1
 """First point of a pair whose points have no gaps of their own, and index of such a point."""
 
 EXCLUDED = 1e6
-"""m or rad: the gap of what does not collide: an excluded pair, a kinematic doll with the ground,
-its joints with their limits."""
+"""m or rad: the gap of what does not collide: an excluded pair, a kinematic body with another one
+or with what never moves, the joints of a kinematic doll with their limits."""
 
 
 @compiled
@@ -107,6 +107,9 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
             out[n + k] = EXCLUDED
             continue
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
+        if s.tree[a.body].kinematic and (b.body == WORLD or s.tree[b.body].kinematic):
+            out[n + k] = EXCLUDED
+            continue
         if tracks and ws.contacts.first_point[k] != NONE:
             continue
         if b.kind == PLANE:

@@ -19,8 +19,12 @@ a quaternion (roots, and ball joints without limits). dof_count: degrees of free
 inertia: principal moments about the center of mass, kg m^2; inertial_orientation: principal axes
 relative to the doll's axes (x, y, z, w). parent_to_joint, joint_to_com: from the parent's center of
 mass to the joint and on to the body's own, m; joint_axes: rows; all three along the doll's axes in
-the bind pose. joint_damping: N m s/rad. kinematic: 1 if its doll moves at
-constant velocities, whatever acts on it, as of infinite inertia (a kinematic body in Box2D)."""
+the bind pose. joint_damping: N m s/rad. kinematic: MOVED, FIXED, or 0 for what forces move."""
+
+MOVED, FIXED = 1, 2
+"""Kinds of kinematic bodies, which have infinite inertia (as in Box2D). All bodies of a doll are
+MOVED at constant velocities; FIXED is a root alone, which stays where it is while forces move the
+bodies that hang on it."""
 
 WORLD = -1
 """In place of the index of a body: what never moves, the ground and static geoms."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..compiling.decorators import compiled, inlined
 from ..maths.cholesky import solve
-from ..maths.vectors import (add, add_scaled, cross, quat, quat_mul, quat_rotate_inverse,
+from ..maths.vectors import (add, add_scaled, cross, neg, quat, quat_mul, quat_rotate_inverse,
                              quat_to_matrix, scale, sub, vec)
 from .kinematics import (Kinematics, forward_kinematics, inertial_frame, linear, point_of_body,
                          put_spatial, root_orientation)
@@ -56,6 +56,9 @@ def forward_dynamics(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q
         if body.kinematic:
             for k in range(6 if body.parent < 0 else body.dof_count):
                 out[body.v_start + k] = 0.0
+            # As in newton_euler_forward(): what does not accelerate does so against gravity.
+            put_spatial(bias, (0.0, 0.0, 0.0), sub(
+                neg(cross(vec(velocity), linear(velocity))), vec(gravity)))
         elif body.parent < 0:
             for k in range(6):
                 bias[k] = -bias[k]

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact_kind import LIMIT, ROLLING
+from ..dynamics.body import MOVED
 from ..dynamics.kinematics import (Kinematics, inertia_times, root_orientation, root_position,
                                    rotate_inertias, velocity_at)
 from ..dynamics.passive import passive_torque
@@ -30,7 +31,7 @@ REMOVABLE = 0.01
 @compiled
 def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.ndarray) -> None:
     """Write the sums over each doll to ``out`` (d,); ``kin``: of q, its inertias are updated. What
-    moves a kinematic body keeps its energy, which counts as zero.
+    moves a doll that is MOVED keeps its energy, which counts as zero.
     """
     rotate_inertias(s.tree, kin, ws.step.dynamics.matrix)
     for d in range(len(out)):
@@ -53,7 +54,7 @@ def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.
         doll.energy = doll.kinetic - s.doll_masses[d] * dot(vec(doll.center), vec(s.gravity))
     for i in range(len(s.tree)):
         body = s.tree[i]
-        if body.kinematic:
+        if body.kinematic == MOVED:
             out[s.body_doll[i]].energy = out[s.body_doll[i]].kinetic = 0.0
         for k in range(body.dof_count if body.has_passive and not body.kinematic else 0):
             out[s.body_doll[i]].energy += passive_torque(body, k, q[body.q_start + k])[2]
