@@ -386,7 +386,7 @@ class Scene:
 
     @cached_property
     def yielding_bones(self) -> np.ndarray:
-        """(n,) which bones forces move: not those of bodies that follow exactly, nor fixed roots."""
+        """(n,) which bones forces move: no fixed roots, and none of what follows exactly."""
         yields = np.array([not placement.is_kinematic for placement in self.dolls])[
             self.doll_of_bone]
         for own, placement in zip(self.bone_slices, self.dolls, strict=True):

@@ -964,7 +964,8 @@ class Simulation:
         """(n,) bones that the ground bears: those that yield and are not animated."""
         if not self._animations:
             return self.scene.yielding_bones
-        return self.scene.yielding_bones & ~np.isin(self.scene.doll_of_bone, self._animations.kinematic)
+        animated = np.isin(self.scene.doll_of_bone, self._animations.kinematic)
+        return self.scene.yielding_bones & ~animated
 
     @cached_property
     def _gap(self) -> JointGap:

@@ -8,8 +8,8 @@ import numpy as np
 
 from ....model import rotation
 from ....model.coordinates import DofLayout
-from ....model.ragdoll import Bone, Joint, Ragdoll, joint_axes
-from ....model.scene import Placement, Scene
+from ....model.ragdoll import Joint, Ragdoll, joint_axes
+from ....model.scene import Scene
 from ...kernels.collision.shapes import SHAPE_KIND
 from ...kernels.dynamics.body import BODY, FIXED, MOVED
 from ...kernels.system import (GEOM, GEOM_PAIR, JOINT_LIMIT, NO_SLIP, System, coordinate_count)
@@ -18,10 +18,6 @@ from ...rigid_body import damping_rate
 MAX_FLIGHT_DAMPING = 1000.0
 """1/s: largest decay rate of joint damping that is integrated explicitly, in flight; above, contact
 steps take it implicitly."""
-
-KINEMATIC_FRICTION = 0.7
-"""Largest friction of what follows exactly: limbs that stick to it and to the ground at once could
-not yield. A roller between the two locks from 1 on."""
 
 GROUND_POINTS = {'sphere': 1, 'capsule': 2, 'box': 8, 'cylinder': 10}
 """Points of each kind of shape that may touch the ground; see ground_point() of the kernels."""
@@ -140,15 +136,8 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray,
 
 def contact_laws(scene: Scene) -> np.ndarray:
     """Friction, rolling friction, m, and restitution (g, 3) of each geom of a scene's dolls."""
-    return np.array([_material_of(scene, placement, bone) for placement in scene.dolls
+    return np.array([scene.material.on(bone) for placement in scene.dolls
                      for bone in placement.doll.bones for _ in bone.shape.parts]).reshape(-1, 3)
-
-
-def _material_of(scene: Scene, placement: Placement, bone: Bone) -> tuple[float, float, float]:
-    friction, rolling_friction, restitution = scene.material.on(bone)
-    if placement.is_kinematic:
-        friction = min(friction, KINEMATIC_FRICTION)
-    return friction, rolling_friction, restitution
 
 
 def make_pairs(geom_pairs: np.ndarray, laws: np.ndarray,

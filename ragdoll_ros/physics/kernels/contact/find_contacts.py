@@ -10,7 +10,7 @@ from ..collision.shapes import CYLINDER, PLANE, TRIANGLE
 from ..collision.triangles.triangle_manifold import ON_FACE
 from ..compiling.decorators import compiled
 from ..contact_kind import FRICTIONAL, LIMIT, ROLLING
-from ..dynamics.body import WORLD
+from ..dynamics.body import MOVED, WORLD
 from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
@@ -22,6 +22,10 @@ from .point_gaps import points_at_start, takes_part
 
 IDS_PER_PAIR = 32768
 """Range of ids that the points of one pair have."""
+
+KINEMATIC_FRICTION = 0.7
+"""Largest friction of what moves whatever acts on it: limbs that stick to it and to the ground at
+once could not yield. A roller between the two locks from 1 on."""
 
 SAME_DIRECTION = 1e-3
 """Triangles whose normals differ by less along x and y may count as of one plane."""
@@ -126,6 +130,9 @@ def add_pair_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
         put(c.normal, vec(at.normal))
         c.gap, c.friction, c.rolling_friction = at.gap, pair.friction, pair.rolling_friction
         c.restitution = pair.restitution
+        if s.tree[a.body].kinematic == MOVED or (
+                b.body != WORLD and s.tree[b.body].kinematic == MOVED):
+            c.friction = min(c.friction, KINEMATIC_FRICTION)
         m += 1
     return m
 
