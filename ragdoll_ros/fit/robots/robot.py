@@ -4,10 +4,13 @@ A link with a shape or a mesh becomes a body. Its joint becomes a hinge, or part
 ball joint where links without a shape are between (as to_urdf writes them). A link without a shape
 is merged into its parent with its mass and inertia, one without a mass with its shapes; one that
 weighs next to nothing is fixed to its parent, with both. Every link's frame becomes a frame of the
-doll, so that it can be published.
+doll, so that it can be published. Angles have the names of the joints in the file, where they count
+from the same zero.
 """
 import math
+from collections import Counter
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -77,8 +80,8 @@ def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str
                        [(link, poses[other]) for other, link in tree.links.items()
                         if carriers[other] == name != other and link.mass > 0], notes)
              for name, text in names.items()]
-    joints = [_joint(tree, name, carriers, light, names, poses, angles, notes)
-              for name in names if name != root]
+    joints = _named_alone([_joint(tree, name, carriers, light, names, poses, angles, notes)
+                           for name in names if name != root])
     above = root
     while above in tree.joints:
         joint, above = tree.joints[above], tree.joints[above].parent
@@ -150,6 +153,15 @@ def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], light: Collectio
     return _combine_hinges(parent, child, anchor, hinges, poses, angles, notes)
 
 
+def _named_alone(joints: list[Joint]) -> list[Joint]:
+    """The joints, without the names that are those of another's angles or that they have anyway."""
+    plain = [replace(joint, names=()) for joint in joints]
+    counts = Counter(name for joint in joints for name in joint.angle_names)
+    taken = {name for joint in plain for name in joint.angle_names}
+    return [joint if all(counts[name] == 1 and name not in taken for name in joint.names) else bare
+            for joint, bare in zip(joints, plain, strict=True)]
+
+
 def _note_friction(tree: UrdfTree) -> list[str]:
     """Notes on friction and restitution of joints and links, which dolls do not have."""
     joints = [joint.name for joint in tree.joints.values()
@@ -177,10 +189,13 @@ def _combine_hinges(parent: str, child: str, anchor: np.ndarray, chain: list[Urd
     limits = [_limits(joint, angles, notes) for joint in concurrent]
     damping = max(joint.damping for joint in concurrent)
     anchor = frames[0].position
+    # Angles that count from elsewhere than the file's do not have its names.
+    known = () if any(angles.get(joint.child) for joint in concurrent) else tuple(
+        plain_name(joint.name, 'joint') for joint in concurrent)
     if len(concurrent) == 1:
-        return Joint(parent, child, 'hinge', anchor, tuple(axes), tuple(limits), damping)
+        return Joint(parent, child, 'hinge', anchor, tuple(axes), tuple(limits), damping, known)
     if len(concurrent) == 2 and abs(axes[0] @ axes[1]) < 1e-6:
-        return Joint(parent, child, 'universal', anchor, tuple(axes), tuple(limits), damping)
+        return Joint(parent, child, 'universal', anchor, tuple(axes), tuple(limits), damping, known)
     return Joint(parent, child, 'ball', anchor, (axes[-1],), _swing_twist_limits(limits), damping)
 
 
