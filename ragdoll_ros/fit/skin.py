@@ -6,7 +6,6 @@ pose is at sum of W_b T_b inv(T_b in the bind pose) v (model/skeleton.py, summed
 """
 import functools
 import os
-from collections.abc import Callable
 
 import numpy as np
 
@@ -41,20 +40,6 @@ def skin_of(doll: Ragdoll) -> Skin | None:
     weights[weights.sum(axis=1) == 0, 0] = 1
     return Skin(character.vertices, character.triangles, bones, weights,
                 *_bind_poses(doll, character, bones), character.appearance)
-
-
-def skins_of(scene: Scene, warn: Callable[[str], None]) -> dict[int, Skin]:
-    """Skins of the dolls that have one, by index; ``warn`` receives a sentence for each failure."""
-    found: dict[int, Skin] = {}
-    for index, placement in enumerate(scene.dolls):
-        try:
-            skin = skin_of(placement.doll)
-        except errors.RagdollError as error:
-            warn(f'no skin for {placement.name}: {error}')
-            continue
-        if skin is not None:
-            found[index] = skin
-    return found
 
 
 def _read_cached(path: str, scale: float | None = None) -> Character:
