@@ -13,6 +13,7 @@ import fit_rigs
 import imageio.v3 as iio
 import numpy as np
 import pytest
+import test_fit_rigid
 import wild_rigs
 from test_fit_split_characters import SMALL, person, write_two
 from test_recordings_formats import moved, to_ros
@@ -113,8 +114,10 @@ class Read:
         return self.names[self.parents[node]] if self.parents[node] >= 0 else None
 
     def image(self, index):
-        entry = self.gltf.images[index]
-        view = self.gltf.bufferViews[entry.bufferView]
+        return self.view(self.gltf.images[index].bufferView)
+
+    def view(self, index):
+        view = self.gltf.bufferViews[index]
         start = view.byteOffset or 0
         return self.gltf.binary_blob()[start:start + view.byteLength]
 
@@ -262,23 +265,68 @@ def test_every_bone_of_the_file_is_within_a_micrometre_at_every_instant(run):
                                    rtol=0, atol=1e-6)
 
 
-def test_the_skin_is_where_linear_blend_skinning_has_it(run):
-    """The skin of the written file, beside sum of w P R^-1 v of the fit's reading of the file."""
-    _, character, recording, states = run
-    riders, read = Riders(recording.scene), Read(gltf_bytes(recording))
+def blended(character, recording, state):
+    """Sum of w P R^-1 v (v, 3) of a character as the fit reads it, with its bones on the doll's."""
+    riders = Riders(recording.scene)
     order = [riders.names.index(name) for name in character.bone_names]
-    bind = Pose(character.positions, character.orientations)
+    poses = Pose(*(part[order] for part in riders.poses(state)))
+    found = np.zeros_like(character.vertices)
+    for bones, weights in zip(character.bones.T, character.weights.T, strict=True):
+        there = Pose(character.positions[bones], character.orientations[bones])
+        now = Pose(poses.position[bones], poses.orientation[bones])
+        found += weights[:, None] * now.apply(there.apply_inverse(character.vertices))
+    return found
+
+
+def test_the_skin_is_where_linear_blend_skinning_has_it(run):
+    _, character, recording, states = run
+    read = Read(gltf_bytes(recording))
     for key in (0, 13, TICKS - 1):
-        poses = Pose(*(part[order] for part in riders.poses(states[key])))
-        expected = np.zeros_like(character.vertices)
-        for slot in range(character.bones.shape[1]):
-            bones, weights = character.bones[:, slot], character.weights[:, slot, None]
-            there = Pose(bind.position[bones], bind.orientation[bones])
-            now = Pose(poses.position[bones], poses.orientation[bones])
-            expected += weights * now.apply(there.apply_inverse(character.vertices))
-        shown = read.at_key(key).skinned(skinned_mesh(read))
         # The file's own matrices and weights have 32 bits: 1e-7 of some metres.
-        np.testing.assert_allclose(shown, expected, rtol=0, atol=2e-6)
+        np.testing.assert_allclose(read.at_key(key).skinned(skinned_mesh(read)), blended(
+            character, recording, states[key]), rtol=0, atol=2e-6)
+
+
+def helmeted():
+    made = fit_rigs.document(test_fit_rigid.PERSON)
+    test_fit_rigid.helmet(made, mirrored=True)
+    return made
+
+
+@pytest.mark.parametrize('made', [test_fit_rigid.parts(), test_fit_rigid.parts(pivots=True),
+                                  helmeted()], ids=['parts', 'pivots', 'helmet'])
+def test_meshes_without_a_skin_go_with_their_bones(made, tmp_path):
+    path = tmp_path / 'rigid.glb'
+    path.write_bytes(made.glb())
+    character = read_character(path)
+    doll = dataclasses.replace(fit_character(character).doll, model=str(path))
+    recording, states = moved(above_ground(doll), 20)
+    read = Read(gltf_bytes(recording)).at_key(19)
+    worlds, nodes = read.worlds(), list(enumerate(read.gltf.nodes))
+    drawn = [read.skinned(k) for k, node in nodes if node.skin is not None]
+    for k, node in nodes:
+        if node.mesh is not None and node.skin is None:
+            (part,) = read.gltf.meshes[node.mesh].primitives
+            points = read.numbers(part.attributes.POSITION)
+            drawn.append(to_ros(points @ worlds[k, :3, :3].T + worlds[k, :3, 3]))
+    np.testing.assert_allclose(np.concatenate(drawn), blended(character, recording, states[19]),
+                               rtol=0, atol=2e-6)  # 32 bits of some metres
+
+
+def test_a_compressed_skin_stays_compressed(tmp_path):
+    test_fit_draco = pytest.importorskip('test_fit_draco')
+    path = tmp_path / 'draco.glb'
+    path.write_bytes(test_fit_draco.compressed().glb())
+    doll = dataclasses.replace(fit_character(read_character(path)).doll, model=str(path))
+    recording, _ = moved(above_ground(doll), 2)
+    file, read = Read(path.read_bytes()), Read(gltf_bytes(recording))
+    key = test_fit_draco.EXTENSION
+    assert key in read.gltf.extensionsUsed and (
+        (key in read.gltf.extensionsRequired) == (key in file.gltf.extensionsRequired))
+    (theirs,), (ours,) = (each.gltf.meshes[0].primitives for each in (file, read))
+    assert ours.extensions[key]['attributes'] == theirs.extensions[key]['attributes']
+    assert (read.view(ours.extensions[key]['bufferView'])
+            == file.view(theirs.extensions[key]['bufferView']))
 
 
 @pytest.mark.parametrize('rig', ['mixamo', 'poles-smooth'])
