@@ -139,8 +139,12 @@ def fit_character(character: Character, options: FitOptions | None = None) -> Fi
               for group in groups if group.fixed]
     carrier = {index: bone for group, bone in zip(groups, bones, strict=True)
                for index in group.bones}
+    links = _links_of_bones(character, carrier)
+    carrier |= {bone: carrier[character.springs[number].carrier]
+                for bone, (number, _) in links.items()}
     doll = Ragdoll(character.name, tuple(bones), tuple(joints),
-                   _swings(character, carrier, notes), _skeleton_frames(character, carrier))
+                   _swings(character, carrier, links, notes),
+                   _skeleton_frames(character, carrier))
     doll = replace(doll, no_collision=colliding_overlaps(doll))
     return Fit(doll, given, tuple(bodies), tuple(notes))
 
@@ -272,12 +276,30 @@ def _skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[Sk
     return tuple(frames)
 
 
-def _swings(character: Character, carrier: dict[int, Bone], notes: list[str]) -> tuple[Swing, ...]:
+def _links_of_bones(character: Character, carrier: dict[int, Bone]) -> dict[int, tuple[int, int]]:
+    """Spring and link of each bone that one moves: those of the chains, and those below them in
+    the file that are not part of another body.
+    """
+    found = {bone: (number, link) for number, spring in enumerate(character.springs)
+             for bone, link in zip(spring.bones, spring.links, strict=True)}
+    for bone, up in enumerate(character.parents):
+        if bone not in found and up in found and carrier[bone].name != character.bone_names[bone]:
+            root = character.springs[found[up][0]].carrier
+            if carrier[bone] is carrier[root]:
+                found[bone] = found[up]
+    return found
+
+
+def _swings(character: Character, carrier: dict[int, Bone], links: dict[int, tuple[int, int]],
+            notes: list[str]) -> tuple[Swing, ...]:
     """The character's spring bones as swings; a note reports gravity that had to be clamped."""
     made = []
-    for spring in character.springs:
+    for number, spring in enumerate(character.springs):
         swing, cut = swing_from_spring(spring, carrier[spring.carrier].name, character.scale)
-        made.append(swing)
+        riders = [tuple(character.bone_names[bone] for bone, of in links.items()
+                        if of == (number, link)) for link in range(len(swing.links))]
+        made.append(replace(swing, links=tuple(
+            replace(link, riders=own) for link, own in zip(swing.links, riders, strict=True))))
         if cut:
             notes.append(f'gravity of spring {spring.name} is clamped to a factor of '
                          f'{swing.gravity:g}')

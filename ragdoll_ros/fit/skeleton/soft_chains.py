@@ -41,8 +41,10 @@ def soft_chains(character: Character, tree: SkinTree, roles: tuple[str | None, .
         soft -= set(chain)
         # A single bone, such as an ear or a jaw, is part of its parent's body.
         if len(chain) > 1 and carrier not in taken:
-            springs.append(_spring(character, chain, carrier,
-                                   [tree.anchors[each][0] for each in chain], clusters[chain[-1]]))
+            springs.append(_spring(
+                character, {each: link for link, each in enumerate(chain)},
+                character.bone_names[bone], carrier, [tree.anchors[each][0] for each in chain],
+                clusters[chain[-1]]))
             taken |= set(chain)
     return springs
 
@@ -63,11 +65,11 @@ def limit_bodies(character: Character, groups: list[BodyGroup],
         family = [branch for branch, size in zip(branches, sizes, strict=True)
                   if groups[branch[0]].parent == carrier and size <= SIMILAR_AREA * min(sizes)]
         for branch in family:
-            bones = [bone for k in branch for bone in groups[k].bones]
-            springs.append(_spring(character, [groups[k].bone for k in branch],
-                                   groups[carrier].bone, [groups[k].anchor for k in branch],
-                                   groups[branch[-1]].vertices, bones))
-            groups[carrier].bones += bones
+            links = {bone: link for link, k in enumerate(branch) for bone in groups[k].bones}
+            springs.append(_spring(character, links, groups[branch[0]].name, groups[carrier].bone,
+                                   [groups[k].anchor for k in branch],
+                                   groups[branch[-1]].vertices))
+            groups[carrier].bones += links
         groups = _remove_groups(groups, {k for branch in family for k in branch})
     return groups, springs
 
@@ -93,11 +95,11 @@ def _remove_groups(groups: list[BodyGroup], removed: set[int]) -> list[BodyGroup
     return [groups[k] for k in remaining]
 
 
-def _spring(character: Character, chain: list[int], carrier: int, roots: list[np.ndarray],
-            last: np.ndarray, bones: list[int] | None = None) -> SpringBone:
-    """Spring bone along the roots of a chain of bones, to the far end of the last one's skin."""
+def _spring(character: Character, links: dict[int, int], name: str, carrier: int,
+            roots: list[np.ndarray], last: np.ndarray) -> SpringBone:
+    """Spring bone of the ``links`` of bones, to the far end of the ``last`` one's vertices."""
     points = character.vertices[last]
     tip = points[np.argmax(np.linalg.norm(points - roots[-1], axis=1))]
     joint = SpringJoint(DEFAULT_STIFFNESS / character.scale, 0.0, DEFAULT_DRAG)
-    return SpringBone(character.bone_names[chain[0]], (), (joint,) * len(chain),
-                      np.array([*roots, tip]), carrier, tuple(bones or chain))
+    return SpringBone(name, (), (joint,) * len(roots), np.array([*roots, tip]), carrier,
+                      tuple(links), tuple(links.values()))

@@ -10,9 +10,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...model.compound import Compound
+from ...model.link_frames import LinkFrames
+from ...model.pose import Pose
 from ...model.ragdoll import DEFAULT_COLOR, Bone
 from ...model.shapes import Shape
 from ...model.skeleton import Skin
+from ...model.swing_mount import mount_swings
 from ..recording import Recording, orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, Glb
 from .gltf_skin import add_material, add_skin
@@ -27,13 +30,12 @@ def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
 
     ``skins`` of dolls, by index in the scene, replace the meshes of their bones. Numbers are
     float32, so each doll's node is at the middle of its motion, rounded to metres: within 16 m
-    positions are exact to 1e-6 m. Swings are not written.
+    positions are exact to 1e-6 m. Of swings only the links that move a skin are written, as nodes.
     """
     glb = Glb()
-    times = glb.accessor(recording.times.astype(np.float32))
+    motion = _Motion(glb, recording.times)
     shapes = _Shapes(glb)
-    channels: list[dict] = []
-    samplers: list[dict] = []
+    links = _link_poses(recording, skins)
     roots = []
     for index, (placement, part) in enumerate(
             zip(recording.scene.dolls, recording.scene.bone_slices, strict=True)):
@@ -43,21 +45,63 @@ def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
         nodes = []
         for k, bone in enumerate(placement.doll.bones):
             shown = {} if index in skins else {'mesh': shapes.mesh(bone)}
-            tracks = {'translation': (positions[:, k] - origin).astype(np.float32),
-                      'rotation': orientations[:, k].astype(np.float32)}
-            nodes.append(glb.add('nodes', name=bone.name, **shown, **{
-                key: track[0].tolist() for key, track in tracks.items()}))
-            for key, track in tracks.items():
-                channels.append({'sampler': len(samplers),
-                                 'target': {'node': nodes[-1], 'path': key}})
-                samplers.append({'input': times, 'output': glb.accessor(track)})
+            nodes.append(motion.node(bone.name, positions[:, k] - origin, orientations[:, k],
+                                     **shown))
+        joints = [nodes[bone] for bone in skins[index].bones] if index in skins else []
+        if index in links:
+            for name, pose in links[index]:
+                nodes.append(motion.node(name, pose.position - origin, pose.orientation))
+                joints.append(nodes[-1])
         roots.append(glb.add('nodes', name=placement.name, translation=origin.tolist(),
                              children=nodes))
         if index in skins:
-            roots.append(add_skin(glb, skins[index], nodes, f'{placement.name} skin'))
-    glb.add('animations', name=recording.scene.name, channels=channels, samplers=samplers)
+            roots.append(add_skin(glb, skins[index], joints, f'{placement.name} skin'))
+    glb.add('animations', name=recording.scene.name, channels=motion.channels,
+            samplers=motion.samplers)
     glb.document['scene'] = glb.add('scenes', name=recording.scene.name, nodes=roots)
     return glb.content()
+
+
+def _link_poses(recording: Recording,
+                skins: Mapping[int, Skin]) -> dict[int, list[tuple[str, Pose]]]:
+    """Names and poses (k,), Y up, of the links that move the skin of each doll that has some."""
+    scene = recording.scene
+    if not any(len(skin.links) for skin in skins.values()):
+        return {}
+    poses = LinkFrames(scene).poses(Pose(recording.positions, recording.orientations),
+                                    recording.rods)
+    names = [name for mount in mount_swings(scene) for name in mount.names]
+    found = {}
+    for index, skin in skins.items():
+        links = skin.links + scene.link_slices[index].start
+        own = poses.at(links)
+        points, turns = points_y_up(own.position), _continuous(orientations_y_up(own.orientation))
+        found[index] = [(names[link], Pose(points[:, k], turns[:, k]))
+                        for k, link in enumerate(links)]
+    return found
+
+
+class _Motion:
+    """The animation's channels and samplers, and the nodes that it moves."""
+
+    def __init__(self, glb: Glb, times: np.ndarray) -> None:
+        self._glb = glb
+        self._times = glb.accessor(times.astype(np.float32))
+        self.channels: list[dict] = []
+        self.samplers: list[dict] = []
+
+    def node(self, name: str, positions: np.ndarray, orientations: np.ndarray,
+             **entry: int) -> int:
+        """Add a node with these poses (k, 3) m and (k, 4), Y up; its index."""
+        tracks = {'translation': positions.astype(np.float32),
+                  'rotation': orientations.astype(np.float32)}
+        node = self._glb.add('nodes', name=name, **entry, **{
+            key: track[0].tolist() for key, track in tracks.items()})
+        for key, track in tracks.items():
+            self.channels.append({'sampler': len(self.samplers),
+                                  'target': {'node': node, 'path': key}})
+            self.samplers.append({'input': self._times, 'output': self._glb.accessor(track)})
+        return node
 
 
 class _Shapes:

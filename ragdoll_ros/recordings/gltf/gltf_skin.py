@@ -15,7 +15,7 @@ INFLUENCES = 4
 
 
 def add_skin(glb: Glb, skin: Skin, nodes: list[int], name: str) -> int:
-    """Add a doll's skin, Y up, with the nodes of its bones as joints; its node."""
+    """Add a doll's skin, Y up, with the ``nodes`` of its joints; its node."""
     weights = np.pad(skin.weights, ((0, 0), (0, max(0, INFLUENCES - skin.weights.shape[1]))))
     joints = np.argsort(-weights, axis=1, kind='stable')[:, :INFLUENCES]
     weights = np.take_along_axis(weights, joints, axis=1)
@@ -25,8 +25,7 @@ def add_skin(glb: Glb, skin: Skin, nodes: list[int], name: str) -> int:
     moved = {'JOINTS_0': glb.accessor(joints, ATTRIBUTES),
              'WEIGHTS_0': glb.accessor(weights.astype(np.float32), ATTRIBUTES)}
     inverses = glb.accessor(_inverse_binds(skin).astype(np.float32))
-    bound = glb.add('skins', joints=[nodes[bone] for bone in skin.bones],
-                    inverseBindMatrices=inverses)
+    bound = glb.add('skins', joints=nodes, inverseBindMatrices=inverses)
     mesh = glb.add('meshes', primitives=_primitives(
         glb, skin, points_y_up(skin.vertices), {'NORMAL': points_y_up(skin_normals(skin))}, moved))
     return glb.add('nodes', name=name, mesh=mesh, skin=bound)
@@ -116,9 +115,9 @@ def _with_textures(glb: Glb, entry: dict, textures: list[int]) -> dict:
 
 
 def _inverse_binds(skin: Skin) -> np.ndarray:
-    """Inverse bind matrices (b, 16), column by column."""
+    """Inverse bind matrices (b + l, 16), column by column."""
     bound = Pose(points_y_up(skin.positions), orientations_y_up(skin.orientations))
-    inverses = np.zeros((len(skin.bones), 4, 4))
+    inverses = np.zeros((len(skin.positions), 4, 4))
     inverses[:, :3, :3] = rotation.matrix(rotation.inverse(bound.orientation))
     inverses[:, :3, 3] = bound.apply_inverse(np.zeros(3))
     inverses[:, 3, 3] = 1
