@@ -29,7 +29,7 @@ from .shapes.fitting import DECIMALS, TOLERANCE, FittedShape, fit_best, fit_shap
 from .skeleton.forced_bodies import find_forced_bodies
 from .skeleton.groups import BodyGroup, group_bones, mirrored_group, vertices_by_bone
 from .skeleton.skin_tree import SkinTree, find_skin_tree
-from .skeleton.soft_chains import limit_bodies, soft_chains
+from .skeleton.soft_chains import limit_bodies, soft_chains, thin_chains
 from .skeleton.split_characters import split_characters
 
 MIN_THICKNESS = 0.01
@@ -161,8 +161,13 @@ def _group_character(character: Character,
     roles = _roles_along(tree, character.bone_names)
     springs = _without_forced(soft_chains(character, tree, roles, clusters), forced)
     swinging |= {bone for spring in springs for bone in spring.bones}
-    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging, forced)
     notes = list(character.notes)
+    if options.smallest is None:
+        thin = _without_forced(thin_chains(character, tree, roles, clusters, swinging), forced)
+        notes += _note_thin(thin)
+        springs += thin
+        swinging |= {bone for spring in thin for bone in spring.bones}
+    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging, forced)
     if options.smallest is None:
         before = len(groups)
         groups, thin = limit_bodies(character, groups, forced)
@@ -178,6 +183,16 @@ def _group_character(character: Character,
     springs = [drop_short_segments(spring, notes) for spring in springs]
     springs = [spring for spring in springs if spring.joints]
     return replace(character, springs=(*character.springs, *springs)), groups, notes
+
+
+def _note_thin(springs: list[SpringBone]) -> list[str]:
+    """Note on thin chains that became swings, and what to do where that is wrong."""
+    if not springs:
+        return []
+    names = ', '.join(spring.name for spring in springs[:4]) + ', ...' * (len(springs) > 4)
+    return [f'thin chains of bones without a known name became swings: {names}; --keep and their '
+            'bones makes bodies of them, and without its entry in swings of the doll a chain is '
+            'fixed to its bone']
 
 
 def _without_forced(springs: Iterable[SpringBone], forced: frozenset[int]) -> list[SpringBone]:
