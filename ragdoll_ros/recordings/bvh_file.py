@@ -15,7 +15,7 @@ import numpy as np
 from ..model import rotation
 from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll
-from .file_skeleton import FileSkeleton, find_file_skeleton
+from .file_skeleton import FileSkeleton, carrier_poses, find_file_skeleton
 from .recording import Recording, orientations_y_up, points_y_up
 
 CENTIMETRES = 100.0
@@ -54,9 +54,10 @@ def bvh_text(recording: Recording, doll: int = 0,
     ``warn`` receives a sentence if its character's file can not be read: the doll's joints are
     written.
     """
-    placement, part = recording.scene.dolls[doll], recording.scene.bone_slices[doll]
-    step, positions, orientations = _resampled(recording)
-    bones = Pose(positions[:, part], orientations[:, part])
+    placement = recording.scene.dolls[doll]
+    step, even = _resampled(recording)
+    bones = carrier_poses(recording.scene, Pose(even.positions, even.orientations),
+                          even.rods)[doll]
     skeleton = find_file_skeleton(placement, warn)
     joints = (_doll_joints(placement.doll, bones) if skeleton is None
               else _file_joints(skeleton, bones, placement.doll.name))
@@ -93,7 +94,7 @@ def _doll_joints(doll: Ragdoll, bones: Pose) -> _Joints:
 
 
 def _file_joints(skeleton: FileSkeleton, bones: Pose, name: str) -> _Joints:
-    """The bones of a doll's file, from the poses (k, b) of the doll's bones.
+    """The bones of a doll's file, from the poses (k, b + l) of the doll's bones and links.
 
     Several without a parent hang on a joint of the ``name`` at the origin, as BVH has one root.
     """
@@ -153,18 +154,20 @@ def _offset(vector: np.ndarray) -> str:
     return 'OFFSET ' + ' '.join(f'{value:.7f}' for value in CENTIMETRES * points_y_up(vector))
 
 
-def _resampled(recording: Recording) -> tuple[float, np.ndarray, np.ndarray]:
-    """Frame time, s, and poses at equal times: the recording's own, or interpolated."""
+def _resampled(recording: Recording) -> tuple[float, Recording]:
+    """Frame time, s, and the recording at equal times: itself, or interpolated."""
     count = len(recording)
     if count == 1:
-        return 1.0, recording.positions, recording.orientations
+        return 1.0, recording
     step = recording.duration / (count - 1)
     times = step * np.arange(count)
     if abs(recording.times - times).max() < TIME_TOLERANCE:
-        return step, recording.positions, recording.orientations
+        return step, recording
     poses = [recording.at(time) for time in times]
-    return (step, np.array([pose.positions for pose in poses]),
-            np.array([pose.orientations for pose in poses]))
+    return step, Recording(
+        recording.scene, times, np.array([pose.positions for pose in poses]),
+        np.array([pose.orientations for pose in poses]),
+        None if recording.rods is None else np.array([pose.rods for pose in poses]))
 
 
 def _zyx_degrees(matrices: np.ndarray) -> np.ndarray:

@@ -30,7 +30,7 @@ def add_character(animation: GltfAnimation, copied: CopiedFile, skeleton: FileSk
         animation: of the recording.
         copied: the file of the skeleton.
         skeleton: of the doll.
-        bones: (k, b) poses of the doll's bones, world frame.
+        bones: (k, b + l) poses of the doll's bones and of the links of its swings, world frame.
         name: of the doll's node.
 
     Raises:

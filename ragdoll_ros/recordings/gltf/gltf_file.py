@@ -15,7 +15,7 @@ from ...model.compound import Compound
 from ...model.pose import Pose
 from ...model.ragdoll import DEFAULT_COLOR, Bone, Ragdoll
 from ...model.shapes import Shape
-from ..file_skeleton import find_file_skeleton, not_of_its_file
+from ..file_skeleton import carrier_poses, find_file_skeleton, not_of_its_file
 from ..recording import Recording, orientations_y_up, points_y_up
 from .animation import GltfAnimation, continuous
 from .character import add_character
@@ -32,16 +32,18 @@ def gltf_bytes(recording: Recording, warn: Callable[[str], None] = warnings.warn
     """A recording as a .glb file.
 
     Numbers are float32, so each doll's node is at the middle of its motion, rounded to metres:
-    within 16 m positions are exact to 1e-6 m. Swings are not written. ``warn`` receives a sentence
-    for each doll whose character's file can not be read: its bones' shapes are written.
+    within 16 m positions are exact to 1e-6 m. Of swings only what hangs on their links in a
+    character's file is written. ``warn`` receives a sentence for each doll whose character's file
+    can not be read: its bones' shapes are written.
     """
     glb = Glb()
     animation = GltfAnimation(glb, recording.times)
     shapes = _Shapes(glb)
     files: dict[str, CopiedFile] = {}
     roots = []
-    for placement, part in zip(recording.scene.dolls, recording.scene.bone_slices, strict=True):
-        bones = Pose(recording.positions[:, part], recording.orientations[:, part])
+    carriers = carrier_poses(recording.scene, Pose(recording.positions, recording.orientations),
+                             recording.rods)
+    for placement, bones in zip(recording.scene.dolls, carriers, strict=True):
         skeleton = find_file_skeleton(placement, warn)
         if skeleton is not None:
             path = skeleton.source.path
@@ -61,7 +63,8 @@ def gltf_bytes(recording: Recording, warn: Callable[[str], None] = warnings.warn
 
 def _add_shapes(animation: GltfAnimation, shapes: '_Shapes', doll: Ragdoll, bones: Pose,
                 name: str) -> int:
-    """Add a doll's bones with their shapes and their motion (k, b); the node of the doll."""
+    """Add a doll's bones with their shapes and their motion (k, b or more); the doll's node."""
+    bones = bones.at(np.arange(len(doll.bones)))
     positions, orientations = points_y_up(bones.position), continuous(
         orientations_y_up(bones.orientation))
     origin = np.round((positions.max(axis=(0, 1)) + positions.min(axis=(0, 1))) / 2)
