@@ -1,4 +1,5 @@
 """Many bones: hair becomes swings, fingers stay where they are wanted."""
+import re
 from dataclasses import replace
 
 import fit_rigs
@@ -8,12 +9,14 @@ from fit_rigs import Rig, limb
 
 from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import read_character
+from ragdoll_ros.fit.report import fit_report
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.scene import above_ground
+from ragdoll_ros.model.skeleton import Riders, rider_names
 from ragdoll_ros.physics.simulation import Simulation
 
 
-def hairy(name, strands=40, pieces=5):
+def hairy(name, strands=40, pieces=5, radius=.008, **changes):
     """A person with strands all about the head, each of some bones."""
     bones = fit_rigs.humanoid('vrm')
     head = next(k for k, bone in enumerate(bones) if 'Head' in bone.name)
@@ -22,17 +25,18 @@ def hairy(name, strands=40, pieces=5):
         way = np.array((np.sin(angle), 0, np.cos(angle)))
         points = [(0, 1.7 - .6 * t, 0) + way * (.1 + .05 * t)
                   for t in np.linspace(0, 1, pieces + 1)]
-        limb(bones, head, [f'{name}{strand}_{k}' for k in range(pieces)], points, [.008] * pieces)
-    return Rig(name, bones)
+        limb(bones, head, [f'{name}{strand}_{k}' for k in range(pieces)], points, [radius] * pieces)
+    return Rig(name, bones, **changes)
 
 
 def fit(rig, folder, options=None):
     return fit_character(read_character(fit_rigs.write(rig, folder)), options)
 
 
-@pytest.mark.parametrize('name', ['hair', 'strand'])
-def test_200_hair_bones_become_swings(tmp_path, name):
-    """By their name, and without one because they are the thinnest of too many bodies."""
+@pytest.mark.parametrize(('name', 'words'), [
+    ('hair', None), ('strand', 'thin chains .*: strand0_0, strand1_0, strand2_0, strand3_0, ...;')])
+def test_200_hair_bones_become_swings(tmp_path, name, words):
+    """By their name, and without one because they are thin chains; then the report says so."""
     made, bald = fit(hairy(name), tmp_path), fit_rigs.fitted('vrm')
     assert {bone.name for bone in made.doll.bones} == {bone.name for bone in bald.doll.bones}
     assert len(made.doll.swings) == 40
@@ -45,11 +49,76 @@ def test_200_hair_bones_become_swings(tmp_path, name):
     # The head is no bigger for its hair.
     head, plain = (each.doll.bone('J_Bip_C_Head').shape.volume for each in (made, bald))
     assert head == pytest.approx(plain, rel=.05)
-    assert any('became swings' in note for note in made.notes) == (name == 'strand')
+    notes = [note for note in made.notes if 'became swings' in note]
+    assert not notes if words is None else re.match(words, *notes)
+    assert words is None or f'warning: {notes[0]}' in fit_report(made)
     with Simulation(above_ground(made.doll)) as simulation:
         for _ in range(20):
             state = simulation.advance()
     assert np.isfinite(state.positions).all()
+
+
+def test_the_thinnest_of_too_many_bodies_become_swings(tmp_path):
+    """Twelve braids of 7 cm and six bones: 92 bodies."""
+    made = fit(hairy('braid', 12, 6, .035), tmp_path)
+    assert len(made.doll.bones) == 20
+    assert [len(swing.links) for swing in made.doll.swings] == [6] * 12
+    assert any(note.startswith('92 bodies are too many') for note in made.notes)
+
+
+@pytest.mark.parametrize('named', [True, False])
+def test_thin_chains_without_a_name_become_swings(tmp_path, named):
+    """On a head that has one, and where no bone of the file has."""
+    rig = hairy('x', 6, 3, named=named)
+    rig.bones = [replace(bone, name=f'bone_{k:03d}') if bone.name.startswith('x') else bone
+                 for k, bone in enumerate(rig.bones)]
+    made = fit(rig, tmp_path)
+    head = next(k for k, bone in enumerate(rig.bones) if 'Head' in bone.name)
+    carrier = made.character.bone_names.index(made.doll.swings[0].bone)
+    assert len(made.doll.swings) == 6 and len(made.doll.bones) == 20
+    assert np.allclose(made.character.positions[carrier], np.take(rig.bones[head].head, [2, 0, 1]),
+                       atol=1e-6)
+    assert all(len(swing.links) == 3 and len(link.riders) == 1
+               for swing in made.doll.swings for link in swing.links)
+    [note] = [note for note in made.notes if 'thin chains' in note]
+    assert '--keep' in note and 'its entry in swings' in note
+
+
+def test_what_the_note_on_thin_chains_says_is_so(tmp_path):
+    """--keep makes bodies of a chain; one whose swing is deleted is fixed to the head."""
+    kept = fit(hairy('x', 6, 3), tmp_path, FitOptions(keep=('x0_*',)))
+    assert {f'x0_{k}' for k in range(3)} < {bone.name for bone in kept.doll.bones}
+    assert len(kept.doll.swings) == 5
+    doll = replace(kept.doll, swings=kept.doll.swings[1:])
+    scene = above_ground(doll)
+    with Simulation(scene) as simulation:
+        for _ in range(20):
+            state = simulation.advance()
+        poses = Riders(scene).poses(state, simulation.swings.rods)
+    names = list(rider_names(scene))
+    head = state.poses(scene.bone_index('J_Bip_C_Head'))
+    local = head.apply_inverse(poses.position[[names.index(f'x1_{k}') for k in range(3)]])
+    frames = {rider.name: rider for rider in doll.riders}
+    assert np.allclose(local, [frames[f'x1_{k}'].position for k in range(3)], atol=1e-9)
+
+
+@pytest.mark.parametrize('name', ['unnamed', 'four_legs_unnamed_centimetres', 'spider', 'bird',
+                                  'star', 'starfish', 'snake', 'chain', 'unreal', 'two_skeletons'])
+def test_limbs_fingers_and_spines_are_no_thin_chains(name):
+    assert fit_rigs.fitted(name).doll.swings == ()
+
+
+@pytest.mark.parametrize(('at', 'points', 'radius'), [
+    # On a hand, as long as an arm; as short as a finger; as thick as an arm; down to the feet.
+    ('J_Bip_L_Hand', [(.84, 1.42, 0), (.84, 1.2, 0), (.84, 1.0, 0)], .01),
+    ('J_Bip_C_Head', [(0, 1.7, -.1), (0, 1.66, -.16), (0, 1.62, -.2)], .01),
+    ('J_Bip_C_Head', [(0, 1.7, -.1), (0, 1.45, -.3), (0, 1.2, -.3)], .06),
+    ('J_Bip_C_Hips', [(0, .95, -.15), (0, .5, -.3), (0, 0, -.3)], .01)])
+def test_other_chains_become_no_swings(tmp_path, at, points, radius):
+    bones = fit_rigs.humanoid('vrm')
+    carrier = next(k for k, bone in enumerate(bones) if bone.name == at)
+    limb(bones, carrier, ['bone_017', 'bone_018'], points, [radius] * 2)
+    assert fit(Rig('chain', bones), tmp_path).doll.swings == ()
 
 
 def test_ears_of_one_bone_are_part_of_the_head(tmp_path):

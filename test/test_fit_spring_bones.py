@@ -14,8 +14,8 @@ from ragdoll_ros.fit.report import fit_report
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.model.state import State
+from ragdoll_ros.model.swing_mount import SwingMount
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.physics.swing.mount import SwingMount
 from ragdoll_ros.physics.swing.swings import Swings
 
 POINTS = [(0, 1.7, -.1), (0, 1.68, -.25), (.05, 1.5, -.3), (.05, 1.25, -.3)]

@@ -267,6 +267,8 @@ def test_what_is_wrong_is_refused():
             simulation.set_strength(1.5)
         with pytest.raises(errors.UnknownJoint, match='nose'):
             simulation.set_strength(0.5, ['nose'])
+        with pytest.raises(errors.WrongForm, match='names'):
+            simulation.set_strength({'left_shin': 0.5}, ['left_shin'])
         with pytest.raises(errors.UnknownDoll, match='nobody'):
             simulation.set_strength(0.5, 'nobody')
         simulation.hold('left_shin', 100, max_torque=10)
@@ -288,6 +290,7 @@ def test_events_repeat_motors_to_the_bit():
             if tick % 20 == 5:
                 simulation.set_pose_target({'l_knee': 0.1 * tick / 5}, {'l_knee': 0.5})
                 simulation.set_strength(tick / 60, ['l_knee', 'head'])
+                simulation.set_strength({'r_knee': tick / 60, 'left_thigh': 0.7})
                 simulation.hold('r_knee', 50, 2, max_torque=3)
             simulation.advance()
         wanted = simulation.state.rows.tobytes()

@@ -4,16 +4,14 @@ from __future__ import annotations
 import dataclasses
 import io
 
-import fit_rigs
 import numpy as np
 import pytest
 from samples import every_kind, scene_of
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.fit.skin import skin_of
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.push import Push
-from ragdoll_ros.model.scene import SECOND, Placement, above_ground
+from ragdoll_ros.model.scene import SECOND, Placement
 from ragdoll_ros.model.shapes import Capsule
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.bvh_file import bvh_text
@@ -151,40 +149,6 @@ def test_gltf_times_and_turns_are_those_of_the_run(run):
         if channel.target.path == 'rotation':
             values = shown.numbers(animation.samplers[channel.sampler].output)
             assert ((values[1:] * values[:-1]).sum(axis=1) > 0).all()
-
-
-def test_gltf_of_a_character_has_its_skin_on_its_bones(tmp_path):
-    """Vertices by the file's own weights and matrices, beside our skin's on the simulation's poses.
-
-    The tube's vertices hang on no more than two bones, so that none of them loses an influence.
-    """
-    character = fit_rigs.write(fit_rigs.RIGS['mixamo'], tmp_path)
-    doll = dataclasses.replace(fit_rigs.fitted('mixamo').doll, model=str(character))
-    scene = above_ground(doll)
-    recording, states = moved(scene, 30)
-    skin = skin_of(doll)
-    shown = Shown(gltf_bytes(recording, {0: skin}))
-    placed, gltf = shown.scene(20), shown.gltf
-    (node,) = (node for node in gltf.nodes if node.skin is not None)
-    attributes = gltf.meshes[node.mesh].primitives[0].attributes
-    points, joints, weights = (shown.numbers(getattr(attributes, key))
-                               for key in ('POSITION', 'JOINTS_0', 'WEIGHTS_0'))
-    bound = gltf.skins[node.skin]
-    inverses = shown.numbers(bound.inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
-    matrices = np.array([placed.graph.get(gltf.nodes[joint].name)[0] @ inverse
-                         for joint, inverse in zip(bound.joints, inverses, strict=True)])
-    blended = np.einsum('vk,vkij->vij', weights, matrices[joints.astype(int)])
-    read = to_ros(np.einsum('vij,vj->vi', blended, np.pad(points, ((0, 0), (0, 1)),
-                                                        constant_values=1))[:, :3])
-    poses = states[20].poses(skin.bones)
-    ours = np.zeros_like(skin.vertices)
-    for k in range(len(skin.bones)):
-        local = rotation.rotate(rotation.inverse(skin.orientations[k]),
-                                skin.vertices - skin.positions[k])
-        ours += skin.weights[:, k:k + 1] * (
-            poses.position[k] + rotation.rotate(poses.orientation[k], local))
-    # Weights of 32 bits on places of some metres.
-    np.testing.assert_allclose(read, ours, atol=2e-6)
 
 
 def test_bvh_has_every_joint_within_a_tenth_of_a_millimetre(run, tmp_path):

@@ -1,4 +1,4 @@
-"""~/pose_target and ~/motor_strength of a node, and ~/go_limp of a doll with motors."""
+"""~/pose_target and strengths of motors of a node, and ~/go_limp of a doll with motors."""
 from __future__ import annotations
 
 import math
@@ -42,6 +42,11 @@ def test_targets_and_strength_come_over_their_topics(node, peer):
     assert angle(node, 'right_shin') == pytest.approx(0.4, abs=0.02)
     strength.publish(Float64(data=0.25))
     peer.wait(lambda: spring('left_shin').strength == 0.25)
+    strengths = peer.sender(JointState, '/ragdoll/joint_strengths')
+    strengths.publish(JointState(name=['left_thigh', 'head_1'], effort=[0.5, 0.0]))
+    peer.wait(lambda: spring('head_1').strength == 0.0)
+    assert {each.angle: each.strength for each in node.simulation.holds
+            if each.strength != 0.25} == {'left_thigh_1': 0.5, 'left_thigh_2': 0.5, 'head_1': 0.0}
     target.publish(JointState(name=['left_shin'], velocity=[1.0]))
     peer.wait(lambda: node.simulation.holds and spring('left_shin').target == 0.8)
     assert not node.input_counts.refused
@@ -75,6 +80,19 @@ def test_a_wrong_strength_is_refused_and_counted(node, wrong):
     assert {each.strength for each in node.simulation.holds} == {1.0}
 
 
+@pytest.mark.parametrize('wrong, text', [
+    (JointState(name=['left_shin', 'nose'], effort=[0.5, 0.5]), 'nose'),
+    (JointState(name=['left_shin', 'head'], effort=[0.5, 1.1]), 'strength'),
+    (JointState(name=['left_shin', 'head'], effort=[0.5, math.nan]), 'strength'),
+    (JointState(name=['left_shin', 'left_shin'], effort=[0.5, 0.5]), 'name'),
+    (JointState(name=['left_shin'], position=[0.5]), 'effort')])
+def test_wrong_strengths_of_joints_are_refused_and_counted(node, wrong, text):
+    node.motors.on_joint_strengths(wrong)
+    assert node.input_counts.refused == {'~/joint_strengths': 1}
+    assert text in node.input_counts.last_reason
+    assert {each.strength for each in node.simulation.holds} == {1.0}
+
+
 def test_a_doll_with_motors_goes_limp(node, peer):
     peer.executor_.add_node(node)
     answer = peer.call(Trigger, 'ragdoll/go_limp', Trigger.Request())
@@ -90,4 +108,5 @@ def test_without_motors_a_target_is_refused(make_node):
     node.unload_world()
     node.motors.on_pose_target(JointState(name=['left_shin'], position=[1.0]))
     node.motors.on_strength(Float64(data=0.5))
+    node.motors.on_joint_strengths(JointState(name=['left_shin'], effort=[0.5]))
     assert 'no world is loaded' in node.input_counts.last_reason

@@ -14,8 +14,8 @@ from ragdoll_ros.model.ragdoll import Bone
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.state import State
 from ragdoll_ros.model.swing import Link, Swing, strand
+from ragdoll_ros.model.swing_mount import SwingMount
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.physics.swing.mount import SwingMount
 from ragdoll_ros.physics.swing.swings import Swings
 from ragdoll_ros.physics.swing.track import Track
 

@@ -12,7 +12,7 @@ from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.state import State
 from ragdoll_ros.model.swing import Link, Swing, strand
-from ragdoll_ros.physics.swing.mount import mount_swings
+from ragdoll_ros.model.swing_mount import mount_swings
 from ragdoll_ros.physics.swing.swings import Swings
 
 TURN = rotation.from_rpy(0.3, 0.2, 0.1)

@@ -1,6 +1,7 @@
 """Whether everybody can use the page: contrast, names, focus, and targets for fingers."""
 from __future__ import annotations
 
+import dataclasses
 import importlib.resources
 
 import numpy as np
@@ -11,9 +12,12 @@ from browser import View, chromium, skip_or_fail
 from page_client import served
 
 from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model.motors import Motors
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 
-SCENE = load_scene('drop')
+DROP = load_scene('drop')
+SCENE = dataclasses.replace(DROP, dolls=(dataclasses.replace(DROP.dolls[0], motors=Motors()),))
+"""With the controls of motors."""
 
 DESKTOP, PHONE = {'width': 1280, 'height': 800}, {'width': 390, 'height': 844}
 
@@ -64,7 +68,7 @@ def opened():
     with served(SimulationSource(SCENE)) as page, chromium() as context:
         view = View(context, f'http://127.0.0.1:{page.server.get_port()}', DESKTOP)
         view.wait(lambda: np.isfinite(view.bodies(SCENE)).all() and page.editor is not None)
-        view.wait(lambda: view.page.get_by_role('slider', name='Strength').count())
+        view.wait(lambda: view.page.get_by_role('slider', name='Strength, N').count())
         yield page, view
         assert not view.errors
         view.close()
@@ -138,7 +142,8 @@ def test_the_keyboard_reaches_all_and_shows_where_it_is(opened):
         if name:
             assert is_seen, name
             names.append(name)
-    for name in ('Commands', 'Play', 'Strength, N', 'Scene', 'Contacts', 'Settings'):
+    for name in ('Commands', 'Play', 'Strength, N', 'Go limp', 'Motor strength', 'Scene',
+                 'Contacts', 'Settings'):
         assert name in names
 
 
@@ -147,7 +152,7 @@ def test_an_arrow_on_a_slider_moves_it_and_pushes_nothing(opened, monkeypatch):
     view.page.set_viewport_size(DESKTOP)
     pushed = []
     monkeypatch.setattr(page.source, 'push', lambda force, duration: pushed.append(force))
-    slider = view.page.get_by_role('slider', name='Strength')
+    slider = view.page.get_by_role('slider', name='Strength, N')
     slider.focus()
     before = page.controls.pushes.strength.value
     view.key('ArrowRight')

@@ -137,7 +137,7 @@ def test_limbs_have_their_colours_on_the_page(run):
     import trimesh
     recording, skin = run
     pose = recording.pose(40)
-    content = gltf_bytes(recording, {0: skin})
+    content = gltf_bytes(recording)
     with served(PlaybackSource(recording)) as page, chromium(draws=True) as browser:
         view = View(browser, f'http://127.0.0.1:{page.server.get_port()}')
         view.page.set_viewport_size({'width': 1280, 'height': 800})

@@ -54,7 +54,7 @@ import numpy as np
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.rotation import from_rotation_vector
 from ragdoll_ros.model.state import State
-from ragdoll_ros.physics.swing.mount import mount_swings
+from ragdoll_ros.model.swing_mount import mount_swings
 from ragdoll_ros.physics.swing.swings import Swings
 scene = load_scene('ponytail')
 def motion(t):

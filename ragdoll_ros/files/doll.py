@@ -91,6 +91,7 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
         if not found:
             found += ragdoll.no_collision_errors(names, data.get('no_collision', ()))
             found += ragdoll.angle_name_errors(joints) + mass_errors(bones)
+            found += ragdoll.link_rider_errors(swings, riders)
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None
@@ -281,6 +282,8 @@ def _link_data(link: Link) -> dict:
     data = {key: getattr(link, key) for key in ('length', 'mass', 'stiffness', 'damping')}
     if link.direction is not None:
         data['direction'] = list(link.direction)
+    if link.riders:
+        data['riders'] = list(link.riders)
     return data
 
 

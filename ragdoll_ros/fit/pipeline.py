@@ -29,7 +29,7 @@ from .shapes.fitting import DECIMALS, TOLERANCE, FittedShape, fit_best, fit_shap
 from .skeleton.forced_bodies import find_forced_bodies
 from .skeleton.groups import BodyGroup, group_bones, mirrored_group, vertices_by_bone
 from .skeleton.skin_tree import SkinTree, find_skin_tree
-from .skeleton.soft_chains import limit_bodies, soft_chains
+from .skeleton.soft_chains import limit_bodies, soft_chains, thin_chains
 from .skeleton.split_characters import split_characters
 
 MIN_THICKNESS = 0.01
@@ -139,8 +139,12 @@ def fit_character(character: Character, options: FitOptions | None = None) -> Fi
               for group in groups if group.fixed]
     carrier = {index: bone for group, bone in zip(groups, bones, strict=True)
                for index in group.bones}
+    links = _links_of_bones(character, carrier)
+    carrier |= {bone: carrier[character.springs[number].carrier]
+                for bone, (number, _) in links.items()}
     doll = Ragdoll(character.name, tuple(bones), tuple(joints),
-                   _swings(character, carrier, notes), _skeleton_frames(character, carrier))
+                   _swings(character, carrier, links, notes),
+                   _skeleton_frames(character, carrier))
     doll = replace(doll, no_collision=colliding_overlaps(doll))
     return Fit(doll, given, tuple(bodies), tuple(notes))
 
@@ -157,8 +161,13 @@ def _group_character(character: Character,
     roles = _roles_along(tree, character.bone_names)
     springs = _without_forced(soft_chains(character, tree, roles, clusters), forced)
     swinging |= {bone for spring in springs for bone in spring.bones}
-    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging, forced)
     notes = list(character.notes)
+    if options.smallest is None:
+        thin = _without_forced(thin_chains(character, tree, roles, clusters, swinging), forced)
+        notes += _note_thin(thin)
+        springs += thin
+        swinging |= {bone for spring in thin for bone in spring.bones}
+    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging, forced)
     if options.smallest is None:
         before = len(groups)
         groups, thin = limit_bodies(character, groups, forced)
@@ -174,6 +183,16 @@ def _group_character(character: Character,
     springs = [drop_short_segments(spring, notes) for spring in springs]
     springs = [spring for spring in springs if spring.joints]
     return replace(character, springs=(*character.springs, *springs)), groups, notes
+
+
+def _note_thin(springs: list[SpringBone]) -> list[str]:
+    """Note on thin chains that became swings, and what to do where that is wrong."""
+    if not springs:
+        return []
+    names = ', '.join(spring.name for spring in springs[:4]) + ', ...' * (len(springs) > 4)
+    return [f'thin chains of bones without a known name became swings: {names}; --keep and their '
+            'bones makes bodies of them, and without its entry in swings of the doll a chain is '
+            'fixed to its bone']
 
 
 def _without_forced(springs: Iterable[SpringBone], forced: frozenset[int]) -> list[SpringBone]:
@@ -272,12 +291,30 @@ def _skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[Sk
     return tuple(frames)
 
 
-def _swings(character: Character, carrier: dict[int, Bone], notes: list[str]) -> tuple[Swing, ...]:
+def _links_of_bones(character: Character, carrier: dict[int, Bone]) -> dict[int, tuple[int, int]]:
+    """Spring and link of each bone that one moves: those of the chains, and those below them in
+    the file that are not part of another body.
+    """
+    found = {bone: (number, link) for number, spring in enumerate(character.springs)
+             for bone, link in zip(spring.bones, spring.links, strict=True)}
+    for bone, up in enumerate(character.parents):
+        if bone not in found and up in found and carrier[bone].name != character.bone_names[bone]:
+            root = character.springs[found[up][0]].carrier
+            if carrier[bone] is carrier[root]:
+                found[bone] = found[up]
+    return found
+
+
+def _swings(character: Character, carrier: dict[int, Bone], links: dict[int, tuple[int, int]],
+            notes: list[str]) -> tuple[Swing, ...]:
     """The character's spring bones as swings; a note reports gravity that had to be clamped."""
     made = []
-    for spring in character.springs:
+    for number, spring in enumerate(character.springs):
         swing, cut = swing_from_spring(spring, carrier[spring.carrier].name, character.scale)
-        made.append(swing)
+        riders = [tuple(character.bone_names[bone] for bone, of in links.items()
+                        if of == (number, link)) for link in range(len(swing.links))]
+        made.append(replace(swing, links=tuple(
+            replace(link, riders=own) for link, own in zip(swing.links, riders, strict=True))))
         if cut:
             notes.append(f'gravity of spring {spring.name} is clamped to a factor of '
                          f'{swing.gravity:g}')

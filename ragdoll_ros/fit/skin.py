@@ -1,20 +1,22 @@
 """Skin of a fitted character, moved by its doll's bones.
 
-All riders of a bone move as one rigid body, so a page or a file needs only the bones that carry
-riders: with the pose T_b of bone b and the sum W_b of its riders' weights, a vertex v of the bind
-pose is at sum of W_b T_b inv(T_b in the bind pose) v (model/skeleton.py, summed by bone).
+All riders of a bone, or of a link of a swing, move as one rigid body, so a page or a file needs as
+joints only the bones and links that carry riders: with the pose T_j of joint j and the sum W_j of
+its riders' weights, a vertex v of the bind pose is at sum of W_j T_j inv(T_j in the bind pose) v
+(model/skeleton.py, summed by joint).
 """
 import functools
 import os
-from collections.abc import Callable
 
 import numpy as np
 
 from ..model import errors, rotation
+from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement, Scene
-from ..model.skeleton import Riders, Skin
+from ..model.skeleton import Riders, Skin, links_of_riders
 from ..model.state import State
+from ..model.swing_mount import mount_swings
 from .reading.character import Character, read_character
 from .skeleton.split_characters import subset_character
 
@@ -33,28 +35,17 @@ def skin_of(doll: Ragdoll) -> Skin | None:
     character = _own_character(doll, character)
     index = {bone.name: k for k, bone in enumerate(doll.bones)}
     carrier = {rider.name: index[rider.bone] for rider in doll.riders}
+    # Links are joints after all bones.
+    carrier |= {name: len(index) + link for name, link in links_of_riders(doll).items()}
     carriers = np.array([carrier[name] for name in character.bone_names])
-    bones, slots = np.unique(carriers, return_inverse=True)
-    weights = np.zeros((len(character.vertices), len(bones)))
+    joints, slots = np.unique(carriers, return_inverse=True)
+    bones, links = joints[joints < len(index)], joints[joints >= len(index)] - len(index)
+    weights = np.zeros((len(character.vertices), len(joints)))
     rows = np.arange(len(weights))[:, None]
     np.add.at(weights, (rows, slots[character.bones]), character.weights)
     weights[weights.sum(axis=1) == 0, 0] = 1
     return Skin(character.vertices, character.triangles, bones, weights,
-                *_bind_poses(doll, character, bones), character.appearance)
-
-
-def skins_of(scene: Scene, warn: Callable[[str], None]) -> dict[int, Skin]:
-    """Skins of the dolls that have one, by index; ``warn`` receives a sentence for each failure."""
-    found: dict[int, Skin] = {}
-    for index, placement in enumerate(scene.dolls):
-        try:
-            skin = skin_of(placement.doll)
-        except errors.RagdollError as error:
-            warn(f'no skin for {placement.name}: {error}')
-            continue
-        if skin is not None:
-            found[index] = skin
-    return found
+                *_bind_poses(doll, character, bones, links), character.appearance, links=links)
 
 
 def _read_cached(path: str, scale: float | None = None) -> Character:
@@ -91,18 +82,25 @@ def _own_character(doll: Ragdoll, character: Character) -> Character:
     return subset_character(character, own)
 
 
-def _bind_poses(doll: Ragdoll, character: Character,
-                bones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bind poses of bodies (n, 3) m and (n, 4) xyzw, from the character's bones on them."""
+def _bind_poses(doll: Ragdoll, character: Character, bones: np.ndarray,
+                links: np.ndarray) -> Pose:
+    """Bind poses (n,) of bodies, and then of links, from the character's bones on the bodies."""
     index_of = {name: k for k, name in enumerate(character.bone_names)}
     riders = {rider.bone: rider for rider in reversed(doll.riders) if rider.name in index_of}
     riders.update({rider.bone: rider for rider in doll.riders if rider.name == rider.bone})
-    attached = [riders[doll.bones[index].name] for index in bones]
+    mounted = mount_swings(Scene('bind', (Placement(doll),)))
+    rests = [(mount.bone, root) for mount in mounted for root in mount.link_roots]
+    carriers = np.array([*bones, *(rests[link][0] for link in links)], int)
+    attached = [riders[doll.bones[index].name] for index in carriers]
     back = rotation.inverse(np.array([rider.orientation for rider in attached]))
     at = [index_of[rider.name] for rider in attached]
     orientations = rotation.multiply(character.orientations[at], back)
     local = np.array([rider.position for rider in attached])
-    return character.positions[at] - rotation.rotate(orientations, local), orientations
+    positions = character.positions[at] - rotation.rotate(orientations, local)
+    if len(links):
+        roots = np.concatenate([np.zeros((len(bones), 3)), [rests[link][1] for link in links]])
+        positions = positions + rotation.rotate(orientations, roots)
+    return Pose(positions, orientations)
 
 
 def _scale_ratio(doll: Ragdoll, character: Character) -> float:

@@ -14,6 +14,10 @@ class Pose(NamedTuple):
     position: np.ndarray = np.zeros(3)
     orientation: np.ndarray = np.array(rotation.IDENTITY)
 
+    def at(self, index: np.ndarray) -> Pose:
+        """The poses (..., k) of these indices (k,) among poses (..., n)."""
+        return Pose(self.position[..., index, :], self.orientation[..., index, :])
+
     def apply(self, points: np.ndarray) -> np.ndarray:
         """Transform points (..., 3) m from the frame to its parent."""
         return self.position + rotation.rotate(self.orientation, points)

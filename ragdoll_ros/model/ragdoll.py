@@ -298,6 +298,7 @@ class Ragdoll:
             found += attachment_errors(key, names, attached)
         found += no_collision_errors(names, self.no_collision)
         found += angle_name_errors(self.joints)
+        found += link_rider_errors(self.swings, self.riders)
         for error in found:
             raise error
 
@@ -431,6 +432,27 @@ def attachment_errors(key: str, names: list[str],
         if name in seen:
             found.append(errors.DuplicateName(f'{key}[{index}].name', name, 'a unique name'))
         seen.add(name)
+    return found
+
+
+def link_rider_errors(swings: Sequence[Swing],
+                      riders: Sequence[SkeletonFrame]) -> list[errors.ModelError]:
+    """Errors of the riders of links: unknown ones, those of other bones, and repeated ones."""
+    found: list[errors.ModelError] = []
+    bones = {rider.name: rider.bone for rider in riders}
+    taken: set[str] = set()
+    moved = [(f'swings[{index}].links[{number}].riders', swing.bone, name)
+             for index, swing in enumerate(swings)
+             for number, link in enumerate(swing.links) for name in link.riders]
+    for where, bone, name in moved:
+        if name not in bones:
+            found.append(errors.UnknownBone(where, name, errors.one_of([*bones], name)))
+        elif bones[name] != bone:
+            found.append(errors.WrongForm(where, name, f"a rider on the swing's bone, {bone}; "
+                                          f'this one is on {bones[name]}'))
+        elif name in taken:
+            found.append(errors.DuplicateName(where, name, 'a rider that no other link moves'))
+        taken.add(name)
     return found
 
 

@@ -379,6 +379,13 @@ class Scene:
         return tuple(map(slice, [0, *ends[:-1]], ends))
 
     @cached_property
+    def link_slices(self) -> tuple[slice, ...]:
+        """Each doll's range in arrays over the links of all swings, in the order of ``dolls``."""
+        ends = list(itertools.accumulate(sum(len(swing.links) for swing in placement.doll.swings)
+                                         for placement in self.dolls))
+        return tuple(map(slice, [0, *ends[:-1]], ends))
+
+    @cached_property
     def doll_of_bone(self) -> np.ndarray:
         """(n,) index into ``dolls`` of each bone."""
         counts = [own.stop - own.start for own in self.bone_slices]

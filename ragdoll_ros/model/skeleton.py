@@ -1,4 +1,4 @@
-"""A doll's skin, and the poses of its skeleton, which is attached to the bones.
+"""A doll's skin, and the poses of its skeleton, which is attached to bones and to links of swings.
 
 Linear blend skinning: a vertex v of the bind pose (doll's frame) moves to the sum of w_j P_j R_j^-1
 v, with P_j the pose of rider j and R_j its initial pose. With a glTF file's inverse bind matrices
@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .link_frames import LinkFrames
 from .pose import Pose
-from .ragdoll import SkeletonFrame
+from .ragdoll import Ragdoll, SkeletonFrame
 from .scene import Scene
 from .state import State
 
@@ -46,10 +47,11 @@ class Appearance:
 class Skin:
     """A doll's skin in its bind pose, doll's frame.
 
-    ``bones`` (b,) are the doll's bones that have riders, ``weights`` (v, b) their skin weights.
-    ``positions`` (b, 3) m and ``orientations`` (b, 4) are the bones' poses that the skin is bound
-    in: the doll's bind pose, unless a limb was moved with its skin. Without ``appearance`` all of
-    it has the ``color`` red, green, blue, opacity.
+    Its joints are ``bones`` (b,), the doll's bones that have riders, and then ``links`` (l,), the
+    links of its swings that have riders, by their place among all of the doll. ``weights``
+    (v, b + l) are the joints' skin weights, ``positions`` (b + l, 3) m and ``orientations``
+    (b + l, 4) their poses that the skin is bound in: the doll's bind pose, unless a limb was moved
+    with its skin. Without ``appearance`` all of it has the ``color`` red, green, blue, opacity.
     """
 
     vertices: np.ndarray
@@ -60,6 +62,12 @@ class Skin:
     orientations: np.ndarray
     appearance: Appearance | None = None
     color: tuple[float, float, float, float] = SKIN_COLOR
+    links: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+    def joint_poses(self, bones: Pose, links: Pose) -> Pose:
+        """Poses (..., b + l) of its joints from those of the doll's bones and links."""
+        both = zip(bones.at(self.bones), links.at(self.links), strict=True)
+        return Pose(*(np.concatenate(parts, axis=-2) for parts in both))
 
 
 def rider_names(scene: Scene) -> tuple[str, ...]:
@@ -82,10 +90,15 @@ class Riders:
 
     def __init__(self, scene: Scene) -> None:
         bones: list[int] = []
+        links: list[int] = []
         riders: list[SkeletonFrame] = []
-        for placement, own in zip(scene.dolls, scene.bone_slices, strict=True):
+        for placement, own, swings in zip(scene.dolls, scene.bone_slices, scene.link_slices,
+                                          strict=True):
             index = {bone.name: k for k, bone in enumerate(placement.doll.bones, own.start)}
             bones += [index[rider.bone] for rider in placement.doll.riders]
+            moved = links_of_riders(placement.doll)
+            links += [swings.start + moved[rider.name] if rider.name in moved else -1
+                      for rider in placement.doll.riders]
             riders += placement.doll.riders
         self.names = rider_names(scene)
         """Names of the m riders, in the order of poses()."""
@@ -93,6 +106,34 @@ class Riders:
         self._offsets = Pose(np.array([rider.position for rider in riders]).reshape(-1, 3),
                              np.array([rider.orientation for rider in riders]).reshape(-1, 4))
 
-    def poses(self, state: State) -> Pose:
-        """Positions (m, 3) m and orientations (m, 4) x, y, z, w of all riders, world frame."""
-        return state.poses(self._bones).compose(self._offsets)
+        self._frames = LinkFrames(scene)
+        self._linked = np.flatnonzero(np.array(links, int) >= 0)
+        self._links = np.array(links, int)[self._linked]
+        self._link_offsets = self._frames.rest.at(self._links).relative(
+            self._offsets.at(self._linked))
+
+    def poses(self, state: State, rods: np.ndarray | None = None) -> Pose:
+        """Poses of all riders.
+
+        Args:
+            state: of the scene's bones.
+            rods: (s, 2, 3) m, both ends of each rod of the scene's swings, world frame, as
+                ``simulation.swings.rods``: riders of hair follow them. None: they keep their place
+                on their bones.
+
+        Returns:
+            Positions (m, 3) m and orientations (m, 4) x, y, z, w, world frame.
+        """
+        found = state.poses(self._bones).compose(self._offsets)
+        if rods is None or not len(self._linked):
+            return found
+        links = self._frames.poses(state.poses(slice(None)), rods).at(self._links)
+        for all_riders, moved in zip(found, links.compose(self._link_offsets), strict=True):
+            all_riders[self._linked] = moved
+        return found
+
+
+def links_of_riders(doll: Ragdoll) -> dict[str, int]:
+    """The link of each rider that one moves, by its place among all links of the doll."""
+    links = (link for swing in doll.swings for link in swing.links)
+    return {name: number for number, link in enumerate(links) for name in link.riders}

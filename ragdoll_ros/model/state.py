@@ -66,8 +66,8 @@ class State:
         """(n, 3, 3), v_world = R v_bone."""
         return rotation.matrix(self.orientations)
 
-    def poses(self, bones: np.ndarray | int) -> Pose:
-        """World poses of bones by index: an array of any shape, or one."""
+    def poses(self, bones: np.ndarray | int | slice) -> Pose:
+        """World poses of bones by index: an array of any shape, one, or a slice."""
         return Pose(self.positions[bones], self.orientations[bones])
 
     def __repr__(self) -> str:

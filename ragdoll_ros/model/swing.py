@@ -30,7 +30,8 @@ MAX_GRAVITY = 10.0
 class Link:
     """A massless rod of ``length`` m with a point ``mass`` (kg) at its end.
 
-    ``direction`` is its rest direction (doll's frame, bind pose); None: its swing's.
+    ``direction`` is its rest direction (doll's frame, bind pose); None: its swing's. ``riders``
+    are the names of those of the doll's riders that it moves, with their skin.
     """
 
     length: float
@@ -38,9 +39,10 @@ class Link:
     stiffness: float = 0.0
     damping: float = 0.0
     direction: Vector | None = None
+    riders: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        set_fields(self, **{key: float(getattr(self, key))
+        set_fields(self, riders=tuple(self.riders), **{key: float(getattr(self, key))
                             for key in ('length', 'mass', 'stiffness', 'damping')})
         errors.check_range('length', self.length, *LENGTH_RANGE)
         errors.check_range('mass', self.mass, *MASS_RANGE)

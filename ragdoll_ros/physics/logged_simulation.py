@@ -104,10 +104,12 @@ class LoggedSimulation(Simulation):
             key: {name: float(value) for name, value in values.items()}
             for key, values in given.items() if values})
 
-    def set_strength(self, strength: float, names: str | Sequence[str] | None = None) -> None:
+    def set_strength(self, strength: float | Mapping[str, float],
+                     names: str | Sequence[str] | None = None) -> None:
         super().set_strength(strength, names)
         self.on_event('set_strength', {
-            'strength': float(strength),
+            'strength': ({name: float(value) for name, value in strength.items()}
+                         if isinstance(strength, Mapping) else float(strength)),
             'names': names if names is None or isinstance(names, str) else list(names)})
 
     def go_limp(self, angles: str | Sequence[str] | None = None) -> None:

@@ -456,24 +456,33 @@ class Simulation:
         """
         self._joint_springs.set_targets(joint_angles or {}, rates or {}, self.time)
 
-    def set_strength(self, strength: float, names: str | Sequence[str] | None = None) -> None:
+    def set_strength(self, strength: float | Mapping[str, float],
+                     names: str | Sequence[str] | None = None) -> None:
         """Set the strength of joint springs, by which stiffness, damping and max_torque are
         multiplied. At 0 a joint is limp.
 
         Args:
-            strength: 0 to 1.
+            strength: 0 to 1; or several, by the names of joint angles or bones, without ``names``.
             names: the name of a doll; or names of joint angles, or of bones, whose joints are those
                 above them; None: all dolls.
 
         Raises:
             UnknownDoll, UnknownJoint: the scene has none of this name.
             OutOfRange: for a strength that is none.
+            WrongForm: for names beside strengths by name.
 
         >>> simulation.set_strength(0.3, ['left_shin'])
+        >>> simulation.set_strength({'left_shin': 0.3, 'head': 1.0})
         """
-        if names is None or isinstance(names, str):
-            names = self._angles_of(None if names is None else self._doll_index(names))
-        self._joint_springs.set_strength(strength, names)
+        if isinstance(strength, Mapping):
+            if names is not None:
+                raise errors.WrongForm('names', names, 'no names beside strengths by name')
+        else:
+            errors.check_range('strength', strength, 0.0, 1.0)
+            if names is None or isinstance(names, str):
+                names = self._angles_of(None if names is None else self._doll_index(names))
+            strength = dict.fromkeys(names, strength)
+        self._joint_springs.set_strengths(strength)
 
     @property
     def animated(self) -> tuple[str, ...]:

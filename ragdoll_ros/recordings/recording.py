@@ -13,7 +13,7 @@ import numpy as np
 from ..model import errors, rotation
 from ..model.scene import SECOND, Scene
 from ..model.state import State
-from ..physics.swing.mount import mount_swings
+from ..model.swing_mount import mount_swings
 
 if TYPE_CHECKING:
     from ..physics.simulation import Simulation

@@ -1,13 +1,13 @@
 """Writing a recording in the format of the file's suffix."""
 import csv
 import io
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from ..model import errors
-from ..model.skeleton import Skin
 from .bvh_file import bvh_text
 from .gltf.gltf_file import gltf_bytes
 from .mcap_file import recording_bytes
@@ -29,11 +29,11 @@ def csv_text(recording: Recording) -> str:
     return stream.getvalue()
 
 
-FORMATS: dict[str, Callable[[Recording, Mapping[int, Skin]], bytes]] = {
-    '.mcap': lambda recording, skins: recording_bytes(recording),
+FORMATS: dict[str, Callable[[Recording, Callable[[str], None]], bytes]] = {
+    '.mcap': lambda recording, warn: recording_bytes(recording),
     '.glb': gltf_bytes,
-    '.bvh': lambda recording, skins: bvh_text(recording).encode(),
-    '.csv': lambda recording, skins: csv_text(recording).encode()}
+    '.bvh': lambda recording, warn: bvh_text(recording, warn=warn).encode(),
+    '.csv': lambda recording, warn: csv_text(recording).encode()}
 """Encoders by suffix."""
 
 
@@ -44,7 +44,7 @@ def check_format(path: Path) -> None:
 
 
 def encoded_files(recording: Recording, path: str | Path,
-                  skins: Mapping[int, Skin] = {}) -> dict[Path, bytes]:
+                  warn: Callable[[str], None] = warnings.warn) -> dict[Path, bytes]:
     """Contents of the files that save_recording writes, by path. Raises OutOfRange."""
     path = Path(path)
     check_format(path)
@@ -52,19 +52,23 @@ def encoded_files(recording: Recording, path: str | Path,
     if path.suffix == '.bvh' and len(dolls) > 1:
         names = [placement.name.replace('/', '_') for placement in dolls]
         return {path.with_name(f'{path.stem}_{name}.bvh'):
-                bvh_text(recording, index).encode() for index, name in enumerate(names)}
-    return {path: FORMATS[path.suffix](recording, skins)}
+                bvh_text(recording, index, warn).encode() for index, name in enumerate(names)}
+    return {path: FORMATS[path.suffix](recording, warn)}
 
 
 def save_recording(recording: Recording, path: str | Path,
-                   skins: Mapping[int, Skin] = {}) -> list[Path]:
+                   warn: Callable[[str], None] = warnings.warn) -> list[Path]:
     """Write a recording as MCAP, glTF, BVH or CSV.
+
+    glTF and BVH of a character that was fitted have the skeleton of its file, glTF also its skin,
+    materials and images.
 
     Args:
         recording: from Recorder.recording().
         path: of the file; its suffix .mcap, .glb, .bvh or .csv is the format. BVH of several dolls
             is a file for each: run.bvh becomes run_left.bvh and run_right.bvh.
-        skins: of dolls by index, for glTF.
+        warn: receives a sentence for each character whose file can not be read; glTF and BVH then
+            have the doll's bones.
 
     Returns:
         Paths of the files.
@@ -80,7 +84,7 @@ def save_recording(recording: Recording, path: str | Path,
         >>> [path.name for path in save_recording(recorder.recording(), 'fall.glb')]
         ['fall.glb']
     """
-    made = encoded_files(recording, path, skins)
+    made = encoded_files(recording, path, warn)
     try:
         for file, content in made.items():
             file.write_bytes(content)

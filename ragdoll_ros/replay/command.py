@@ -8,7 +8,6 @@ import numpy as np
 
 from ..files.bags.bag import read_messages
 from ..files.run_scene import versions
-from ..fit.skin import skins_of
 from ..model import errors
 from ..model.scene import SECOND
 from ..physics.accuracy import ACCURACIES
@@ -204,10 +203,9 @@ class FirstSceneRecorder:
 
 
 def save(recording: Recording, paths: list[Path]) -> None:
-    """Write a recording, with the skins of its dolls that can be read, and print the paths."""
-    skins = skins_of(recording.scene, warn)
+    """Write a recording and print the paths."""
     for path in paths:
-        for written in save_recording(recording, path, skins):
+        for written in save_recording(recording, path, warn):
             print(f'{written}: {len(recording)} instants, {recording.duration:.2f} s')
 
 

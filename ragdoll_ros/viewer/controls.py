@@ -12,7 +12,7 @@ from ..model.scene import Scene
 from ..physics.engine.registry import ENGINES
 from .pushing.ball import BallThrower
 from .pushing.push_keys import PushKeys
-from .sources.source import Source, SourceStatus
+from .sources.source import Frame, Source, SourceStatus
 
 FIRST_SCENES = {'Doll': 'drop', 'Person': 'man_faints', 'Skin': 'character_falls',
                 'Hair': 'ponytail', 'Crowd': 'crowd'}
@@ -33,6 +33,8 @@ class Controls:
         """Called before another scene is loaded."""
         self._shown_engine = ''
         self._shown_scene = OTHER
+        self._run: tuple[Scene, int] | None = None
+        """Scene and number of the run of the newest frame."""
         self._loop = server.get_event_loop()
         gui, is_simulated = server.gui, source.recording is None
         self.pushes = PushKeys(server, source)
@@ -41,6 +43,11 @@ class Controls:
             'Go limp', visible=False, hint='End animations and motors: the doll falls, from its '
             'pose and with its velocities')
         self.go_limp.on_click(self._on_go_limp)
+        self.motor_strength = gui.add_slider(
+            'Motor strength', 0.0, 1.0, step=0.01, initial_value=1.0, visible=False,
+            hint='Share of stiffness, damping and largest torque that all motors have; at 0 the '
+            'doll is limp')
+        self.motor_strength.on_update(self._on_motor_strength)
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
         self.first_scenes = gui.add_button_group(
@@ -60,9 +67,24 @@ class Controls:
             self._show_engine(status.engine)
 
     def show_animated(self, scene: Scene) -> None:
-        """Show the button that ends animations and motors, if the scene has any."""
-        self.go_limp.visible = self.source.recording is None and any(
-            placement.animation or placement.motors for placement in scene.dolls)
+        """Show the button that ends animations and motors, and the slider of motors, if the scene
+        has any.
+        """
+        is_simulated, dolls = self.source.recording is None, scene.dolls
+        self.go_limp.visible = is_simulated and any(
+            placement.animation or placement.motors for placement in dolls)
+        self.motor_strength.visible = is_simulated and any(
+            placement.motors for placement in dolls)
+
+    def add(self, frame: Frame) -> None:
+        """Take note of a new frame: at the start of a run motors have their scene's strength."""
+        if self._run is not None and self._run[0] is frame.scene and self._run[1] == frame.run:
+            return
+        self._run = frame.scene, frame.run
+        strengths = [each.motors.strength for each in frame.scene.dolls if each.motors is not None]
+        if strengths:
+            self._loop.call_soon_threadsafe(
+                setattr, self.motor_strength, 'value', max(strengths))
 
     def show_scene(self, name: str) -> None:
         """Show the name of the scene.
@@ -88,6 +110,11 @@ class Controls:
     async def _on_go_limp(self, _: viser.GuiEvent) -> None:
         """End animations and motors; in viser's thread, so that it comes before a later step."""
         self.source.go_limp()
+
+    async def _on_motor_strength(self, event: viser.GuiEvent) -> None:
+        """Set the strength that a page has chosen; in viser's thread, as _on_go_limp."""
+        if event.client is not None:
+            self.source.set_strength(event.target.value)
 
     async def _on_scene(self, event: viser.GuiEvent) -> None:
         """Load the chosen scene, whose name is read before the page can overwrite it."""

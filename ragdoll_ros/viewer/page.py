@@ -167,6 +167,7 @@ class Page:
         self._live = frame
         self._recording.add(frame)
         self.timeline.add(frame)
+        self.controls.add(frame)
         self.controls.pushes.add(frame)
         self.plots.add(frame, self.timeline.live_instant(frame), status, now)
 

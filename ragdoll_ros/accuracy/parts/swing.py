@@ -18,7 +18,7 @@ from ...model.ragdoll import Bone
 from ...model.shapes import Sphere
 from ...model.state import State
 from ...model.swing import Link, Swing
-from ...physics.swing.mount import SwingMount
+from ...model.swing_mount import SwingMount
 from ..references.closed_forms import pendulum_angle
 from ..results.runner import Job, Row, RunOptions
 

@@ -158,9 +158,12 @@ def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
             notes.append(f'spring {spring.name} has no bone above it: ignored')
             continue
         spring = with_points(spring, nodes, skins.bind_matrices)
+        # The last node of VRM 1.0 ends the last segment.
+        links = {place[node]: min(number, len(spring.joints) - 1)
+                 for number, node in enumerate(spring.nodes) if node in place}
         found.append(drop_short_segments(replace(
-            spring, points=spring.points @ matrix.T, carrier=carrier,
-            bones=tuple(place[node] for node in spring.nodes if node in place)), notes))
+            spring, points=spring.points @ matrix.T, carrier=carrier, bones=tuple(links),
+            links=tuple(links.values())), notes))
     found = [spring for spring in found if spring.joints]
     names = unique_names([spring.name for spring in found], 'bone')
     return tuple(replace(spring, name=name) for spring, name in zip(found, names, strict=True))

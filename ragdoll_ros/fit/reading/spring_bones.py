@@ -46,6 +46,8 @@ class SpringBone:
     """The character's bone that the chain is attached to."""
     bones: tuple[int, ...] = ()
     """The character's bones in the chain."""
+    links: tuple[int, ...] = ()
+    """The segment that each of these moves with, from 0."""
 
 
 def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[SpringBone]:
@@ -104,7 +106,9 @@ def drop_short_segments(spring: SpringBone, notes: list[str]) -> SpringBone:
         return spring
     notes.append(f'spring {spring.name} has segments below {1000 * LENGTH_RANGE[0]:g} mm: ignored')
     joints = tuple(joint for joint, keep in zip(spring.joints, long, strict=True) if keep)
-    return replace(spring, points=spring.points[np.concatenate([[True], long])], joints=joints)
+    before = np.minimum(np.cumsum(long) - long, max(len(joints) - 1, 0))
+    return replace(spring, points=spring.points[np.concatenate([[True], long])], joints=joints,
+                   links=tuple(before[list(spring.links)].tolist()))
 
 
 def _spring(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> SpringBone:

@@ -1,10 +1,14 @@
 """Hair, skirts and capes as spring bones: chains of bones that support no body.
 
-Chains with such names become spring bones, and so do the thinnest branches of a character with
-more bodies than run in real time. They have VRM's default settings and do not collide.
+Chains with such names become spring bones, and so do thin chains without a known name and the
+thinnest branches of a character with more bodies than run in real time. They have VRM's default
+settings and do not collide.
 """
+from collections import Counter
+
 import numpy as np
 
+from ...files.bone_names.names import ARM, LEG
 from ..reading.character import Character
 from ..reading.spring_bones import SpringBone, SpringJoint
 from .groups import BodyGroup
@@ -12,6 +16,20 @@ from .skin_tree import SkinTree
 
 MAX_BODIES = 60
 """Bodies of a doll: with as many ball joints, a tick of 10 ms takes about 10 ms."""
+
+MIN_THIN_LENGTH = 0.12
+"""Shortest thin chain, as a fraction of the character's extent: a person's finger is 0.06, with its
+bone in the palm 0.1."""
+
+MAX_THIN_RADIUS = 0.1
+"""Largest mean distance of a thin chain's skin from it, as a fraction of its length."""
+
+MAX_THIN_AREA = 0.03
+"""Largest fraction of the skin on a thin chain: a person's arm has 0.1, a spider's leg 0.09."""
+
+MIN_THIN_HEIGHT = 0.05
+"""Height of a thin chain's skin above the character's lowest, as a fraction of its extent: what
+reaches the ground may be a leg."""
 
 SIMILAR_AREA = 2.0
 """Ratio of skin areas per bone up to which branches count as equally thin."""
@@ -41,10 +59,59 @@ def soft_chains(character: Character, tree: SkinTree, roles: tuple[str | None, .
         soft -= set(chain)
         # A single bone, such as an ear or a jaw, is part of its parent's body.
         if len(chain) > 1 and carrier not in taken:
-            springs.append(_spring(character, chain, carrier,
-                                   [tree.anchors[each][0] for each in chain], clusters[chain[-1]]))
+            springs.append(_spring(
+                character, {each: link for link, each in enumerate(chain)},
+                character.bone_names[bone], carrier, [tree.anchors[each][0] for each in chain],
+                clusters[chain[-1]]))
             taken |= set(chain)
     return springs
+
+
+def thin_chains(character: Character, tree: SkinTree, roles: tuple[str | None, ...],
+                clusters: list[np.ndarray], taken: frozenset[int]) -> list[SpringBone]:
+    """Spring bones of unbranched chains of two or more thin bones that end freely.
+
+    None of their bones has a role or is ``taken``, and they do not hang on a limb, so that they are
+    no fingers either. Without any names, length, skin and height tell them from limbs.
+    """
+    skinned = [bone for bone in tree.order if len(clusters[bone]) and bone not in taken]
+    count = Counter(tree.parents[bone] for bone in skinned)
+    areas = character.vertex_areas()
+    springs = []
+    for end in (bone for bone in skinned if not count[bone] and tree.parents[bone] >= 0):
+        chain, above = [end], tree.parents[end]
+        while (count[above] == 1 and above in skinned and roles[above] is None
+               and tree.parents[above] >= 0):
+            chain.insert(0, above)
+            above = tree.parents[above]
+        if (len(chain) < 2 or above in taken or roles[end]
+                or roles[above] in (*ARM, *LEG, 'clavicle')):
+            continue
+        spring = _spring(character, {bone: link for link, bone in enumerate(chain)},
+                         character.bone_names[chain[0]], above,
+                         [tree.anchors[bone][0] for bone in chain], clusters[end])
+        if _is_thin(character, spring, [clusters[bone] for bone in chain], areas):
+            springs.append(spring)
+    return springs
+
+
+def _is_thin(character: Character, spring: SpringBone, clusters: list[np.ndarray],
+             areas: np.ndarray) -> bool:
+    """Whether a chain is long, and has little skin, all of it near the chain and off the ground."""
+    assert spring.points is not None
+    steps = np.diff(spring.points, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    skin = np.concatenate(clusters)
+    if (lengths.sum() < MIN_THIN_LENGTH * character.extent or not lengths.all()
+            or areas[skin].sum() > MAX_THIN_AREA * areas.sum()):
+        return False
+    height = character.vertices[skin, 2].min() - character.vertices[:, 2].min()
+    if height < MIN_THIN_HEIGHT * character.extent:
+        return False
+    distances = [np.linalg.norm(np.cross(character.vertices[own] - root, step / length), axis=1)
+                 for own, root, step, length in zip(clusters, spring.points, steps, lengths,
+                                                    strict=False)]
+    return bool(np.concatenate(distances).mean() <= MAX_THIN_RADIUS * lengths.sum())
 
 
 def limit_bodies(character: Character, groups: list[BodyGroup],
@@ -63,11 +130,11 @@ def limit_bodies(character: Character, groups: list[BodyGroup],
         family = [branch for branch, size in zip(branches, sizes, strict=True)
                   if groups[branch[0]].parent == carrier and size <= SIMILAR_AREA * min(sizes)]
         for branch in family:
-            bones = [bone for k in branch for bone in groups[k].bones]
-            springs.append(_spring(character, [groups[k].bone for k in branch],
-                                   groups[carrier].bone, [groups[k].anchor for k in branch],
-                                   groups[branch[-1]].vertices, bones))
-            groups[carrier].bones += bones
+            links = {bone: link for link, k in enumerate(branch) for bone in groups[k].bones}
+            springs.append(_spring(character, links, groups[branch[0]].name, groups[carrier].bone,
+                                   [groups[k].anchor for k in branch],
+                                   groups[branch[-1]].vertices))
+            groups[carrier].bones += links
         groups = _remove_groups(groups, {k for branch in family for k in branch})
     return groups, springs
 
@@ -93,11 +160,11 @@ def _remove_groups(groups: list[BodyGroup], removed: set[int]) -> list[BodyGroup
     return [groups[k] for k in remaining]
 
 
-def _spring(character: Character, chain: list[int], carrier: int, roots: list[np.ndarray],
-            last: np.ndarray, bones: list[int] | None = None) -> SpringBone:
-    """Spring bone along the roots of a chain of bones, to the far end of the last one's skin."""
+def _spring(character: Character, links: dict[int, int], name: str, carrier: int,
+            roots: list[np.ndarray], last: np.ndarray) -> SpringBone:
+    """Spring bone of the ``links`` of bones, to the far end of the ``last`` one's vertices."""
     points = character.vertices[last]
     tip = points[np.argmax(np.linalg.norm(points - roots[-1], axis=1))]
     joint = SpringJoint(DEFAULT_STIFFNESS / character.scale, 0.0, DEFAULT_DRAG)
-    return SpringBone(character.bone_names[chain[0]], (), (joint,) * len(chain),
-                      np.array([*roots, tip]), carrier, tuple(bones or chain))
+    return SpringBone(name, (), (joint,) * len(roots), np.array([*roots, tip]), carrier,
+                      tuple(links), tuple(links.values()))

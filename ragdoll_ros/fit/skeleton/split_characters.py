@@ -94,7 +94,9 @@ def subset_character(character: Character, own: np.ndarray) -> Character:
                                   material_indices=look.material_indices[triangles])
     chosen = np.flatnonzero(own)
     springs = tuple(replace(spring, carrier=int(place[spring.carrier]),
-                            bones=tuple(int(place[bone]) for bone in spring.bones if own[bone]))
+                            bones=tuple(int(place[bone]) for bone in spring.bones if own[bone]),
+                            links=tuple(link for bone, link in zip(spring.bones, spring.links,
+                                                                   strict=True) if own[bone]))
                     for spring in character.springs if own[spring.carrier])
     return replace(
         character, bone_names=tuple(character.bone_names[bone] for bone in chosen),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -163,13 +163,14 @@ class JointSprings:
                 self._all[name] = self._all[name].aimed(angle, rate, TIMEOUT / SECOND, time)
         self._forget()
 
-    def set_strength(self, strength: float, names: Iterable[str]) -> None:
-        """Set the strength of springs, by the names of angles or of bones below joints."""
-        errors.check_range('strength', strength, 0.0, 1.0)
-        found = [angle for name in names for angle in self._angles(name)]
-        for angle in found:
-            if angle in self._all:
-                self._all[angle] = dataclasses.replace(self._all[angle], strength=float(strength))
+    def set_strengths(self, strengths: Mapping[str, float]) -> None:
+        """Set strengths of springs, by the names of angles or of bones below joints."""
+        for strength in strengths.values():
+            errors.check_range('strength', strength, 0.0, 1.0)
+        found = {angle: float(strength) for name, strength in strengths.items()
+                 for angle in self._angles(name)}
+        for angle in found.keys() & self._all.keys():
+            self._all[angle] = dataclasses.replace(self._all[angle], strength=found[angle])
         self._forget()
 
     def changed(self, change: SceneChange) -> JointSprings:

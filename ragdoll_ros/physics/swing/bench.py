@@ -7,7 +7,7 @@ import numpy as np
 from ...model.rotation import from_rotation_vector
 from ...model.state import State
 from ...model.swing import Swing, strand
-from .mount import SwingMount
+from ...model.swing_mount import SwingMount
 from .swings import Swings
 from .track import Track
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...model.swing_mount import SwingMount
 from ..kernels.compiling.decorators import rows_of
 from ..kernels.swing.links import LINK
 from ..kernels.swing.loaded import chain_modes
-from .mount import SwingMount
 
 
 def make_links(mounted: Sequence[SwingMount], gravity: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model import rotation
 from ...model.state import State
-from .mount import SwingMount, each_link
+from ...model.swing_mount import SwingMount, each_link
 
 
 @dataclass(frozen=True)

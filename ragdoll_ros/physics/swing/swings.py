@@ -19,14 +19,14 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from ...model import rotation
-from ...model.scene import SECOND, Placement, Scene
+from ...model.scene import SECOND, Scene
 from ...model.scene_change import SceneChange
 from ...model.state import State
+from ...model.swing_mount import SwingMount, mount_swings
 from ..kernels.compiling.decorators import rows_of
 from ..kernels.swing.links import LINK_STATE, RESPONSE, Chains
 from ..kernels.swing.loaded import advance_chains
 from .chains import make_links
-from .mount import SwingMount, mount_swings
 from .pose import FreeMasses, MassIndex, SwingState
 from .track import Track
 
@@ -246,16 +246,8 @@ class SwingSimulation:
 
 def _new_masses(change: SceneChange) -> np.ndarray:
     """Index (m,) in the scene after of each mass of the scene before; -1: it is gone."""
-    first, at = [], 0
-    for placement in change.after.dolls:
-        first.append(at)
-        at += _mass_count(placement)
+    before, after = change.before.link_slices, change.after.link_slices
     return np.concatenate([
-        first[doll] + np.arange(_mass_count(placement)) if doll >= 0
-        else np.full(_mass_count(placement), -1)
-        for placement, doll in zip(change.before.dolls, change.new_dolls, strict=True)])
-
-
-def _mass_count(placement: Placement) -> int:
-    """Masses of all swings of a doll."""
-    return sum(len(swing.links) for swing in placement.doll.swings)
+        np.arange(own.stop - own.start) + after[doll].start if doll >= 0
+        else np.full(own.stop - own.start, -1)
+        for own, doll in zip(before, change.new_dolls, strict=True)])

@@ -29,16 +29,17 @@ class Glb:
         rows = array.reshape(len(array), -1)
         bounds = {key: edge.tolist() for key, edge in (
             ('min', rows.min(axis=0)), ('max', rows.max(axis=0)))} if len(rows) else {}
-        return self.add('accessors', bufferView=self.view(array.tobytes(), target),
+        kept = {} if target is None else {'target': target}
+        return self.add('accessors', bufferView=self.view(array.tobytes(), **kept),
                         componentType=COMPONENTS[array.dtype.name], count=len(rows),
                         type=KINDS[rows.shape[1]], **bounds)
 
-    def view(self, content: bytes, target: int | None = None) -> int:
-        """Add a buffer view, aligned to four bytes."""
+    def view(self, content: bytes, **entry: object) -> int:
+        """Add a buffer view, aligned to four bytes, with further properties."""
         at = len(self._bytes)
         self._bytes += content + b'\0' * (-len(content) % 4)
         return self.add('bufferViews', buffer=0, byteOffset=at, byteLength=len(content),
-                        **({} if target is None else {'target': target}))
+                        **entry)
 
     def content(self) -> bytes:
         """The file (glTF 2.0, 4.4)."""

@@ -1,63 +1,81 @@
 """Recordings as glTF 2.0 animations.
 
-Y up, facing +Z, metres. Each doll is a node, each bone a child node with a mesh at the bone's
-centre of mass, in its axes. The animation has poses, not joint angles, so that errors do not add up
-along a limb.
+Y up, facing +Z, metres. Each doll is a node. That of a fitted character contains the character's
+file (character.py). Of others each bone is a child node with a mesh at the bone's centre of mass,
+in its axes; the animation has poses, not joint angles, so that errors do not add up along a limb.
 """
 import math
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable
 
 import numpy as np
 
+from ...model import errors
 from ...model.compound import Compound
-from ...model.ragdoll import DEFAULT_COLOR, Bone
+from ...model.pose import Pose
+from ...model.ragdoll import DEFAULT_COLOR, Bone, Ragdoll
 from ...model.shapes import Shape
-from ...model.skeleton import Skin
+from ..file_skeleton import carrier_poses, find_file_skeleton, not_of_its_file
 from ..recording import Recording, orientations_y_up, points_y_up
+from .animation import GltfAnimation, continuous
+from .character import add_character
+from .copied_file import CopiedFile
 from .glb import ATTRIBUTES, Glb
-from .gltf_skin import add_material, add_skin
+from .gltf_skin import add_material
 
 CREASE = math.radians(40)
 """rad, crease angle: above the 18 degrees between faces of a circle of 20 vertices, below a box's
 90."""
 
 
-def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
+def gltf_bytes(recording: Recording, warn: Callable[[str], None] = warnings.warn) -> bytes:
     """A recording as a .glb file.
 
-    ``skins`` of dolls, by index in the scene, replace the meshes of their bones. Numbers are
-    float32, so each doll's node is at the middle of its motion, rounded to metres: within 16 m
-    positions are exact to 1e-6 m. Swings are not written.
+    Numbers are float32, so each doll's node is at the middle of its motion, rounded to metres:
+    within 16 m positions are exact to 1e-6 m. Of swings only what hangs on their links in a
+    character's file is written. ``warn`` receives a sentence for each doll whose character's file
+    can not be read: its bones' shapes are written.
     """
     glb = Glb()
-    times = glb.accessor(recording.times.astype(np.float32))
+    animation = GltfAnimation(glb, recording.times)
     shapes = _Shapes(glb)
-    channels: list[dict] = []
-    samplers: list[dict] = []
+    files: dict[str, CopiedFile] = {}
     roots = []
-    for index, (placement, part) in enumerate(
-            zip(recording.scene.dolls, recording.scene.bone_slices, strict=True)):
-        positions = points_y_up(recording.positions[:, part])
-        orientations = _continuous(orientations_y_up(recording.orientations[:, part]))
-        origin = np.round((positions.max(axis=(0, 1)) + positions.min(axis=(0, 1))) / 2)
-        nodes = []
-        for k, bone in enumerate(placement.doll.bones):
-            shown = {} if index in skins else {'mesh': shapes.mesh(bone)}
-            tracks = {'translation': (positions[:, k] - origin).astype(np.float32),
-                      'rotation': orientations[:, k].astype(np.float32)}
-            nodes.append(glb.add('nodes', name=bone.name, **shown, **{
-                key: track[0].tolist() for key, track in tracks.items()}))
-            for key, track in tracks.items():
-                channels.append({'sampler': len(samplers),
-                                 'target': {'node': nodes[-1], 'path': key}})
-                samplers.append({'input': times, 'output': glb.accessor(track)})
-        roots.append(glb.add('nodes', name=placement.name, translation=origin.tolist(),
-                             children=nodes))
-        if index in skins:
-            roots.append(add_skin(glb, skins[index], nodes, f'{placement.name} skin'))
-    glb.add('animations', name=recording.scene.name, channels=channels, samplers=samplers)
+    carriers = carrier_poses(recording.scene, Pose(recording.positions, recording.orientations),
+                             recording.rods)
+    for placement, bones in zip(recording.scene.dolls, carriers, strict=True):
+        skeleton = find_file_skeleton(placement, warn)
+        if skeleton is not None:
+            path = skeleton.source.path
+            try:
+                if path not in files:
+                    files[path] = CopiedFile(glb, skeleton.source.file)
+                roots.append(add_character(animation, files[path], skeleton, bones,
+                                           placement.name))
+                continue
+            except (errors.ModelError, OSError) as error:
+                warn(not_of_its_file(placement, error))
+        roots.append(_add_shapes(animation, shapes, placement.doll, bones, placement.name))
+    animation.end(recording.scene.name)
     glb.document['scene'] = glb.add('scenes', name=recording.scene.name, nodes=roots)
     return glb.content()
+
+
+def _add_shapes(animation: GltfAnimation, shapes: '_Shapes', doll: Ragdoll, bones: Pose,
+                name: str) -> int:
+    """Add a doll's bones with their shapes and their motion (k, b or more); the doll's node."""
+    bones = bones.at(np.arange(len(doll.bones)))
+    positions, orientations = points_y_up(bones.position), continuous(
+        orientations_y_up(bones.orientation))
+    origin = np.round((positions.max(axis=(0, 1)) + positions.min(axis=(0, 1))) / 2)
+    nodes = []
+    for k, bone in enumerate(doll.bones):
+        tracks = {'translation': (positions[:, k] - origin).astype(np.float32),
+                  'rotation': orientations[:, k].astype(np.float32)}
+        nodes.append(animation.glb.add('nodes', name=bone.name, mesh=shapes.mesh(bone), **{
+            key: track[0].tolist() for key, track in tracks.items()}))
+        animation.add(nodes[-1], tracks)
+    return animation.glb.add('nodes', name=name, translation=origin.tolist(), children=nodes)
 
 
 class _Shapes:
@@ -88,13 +106,6 @@ class _Shapes:
             self._attributes[shape] = {'POSITION': self._glb.accessor(places, ATTRIBUTES),
                                        'NORMAL': self._glb.accessor(normals, ATTRIBUTES)}
         return self._attributes[shape]
-
-
-def _continuous(orientations: np.ndarray) -> np.ndarray:
-    """The same rotations (k, n, 4), with the sign of q that is nearer to the instant before."""
-    steps = np.einsum('kni,kni->kn', orientations[1:], orientations[:-1])
-    signs = np.cumprod(np.where(steps < 0, -1.0, 1.0), axis=0)
-    return np.concatenate([orientations[:1], orientations[1:] * signs[..., None]])
 
 
 def crease_normals(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,35 +1,11 @@
-"""A doll's skin in a glTF file: surface, materials, images, joints and weights."""
+"""The surface of a doll's skin in a glTF file: normals, materials, images."""
 import numpy as np
 
-from ...model import rotation
-from ...model.pose import Pose
 from ...model.skeleton import Appearance, Skin
-from ..recording import orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, INDICES, Glb
 
 ROUGHNESS = 0.8
 """glTF's roughnessFactor of surfaces without materials."""
-
-INFLUENCES = 4
-"""Most joints of a vertex that every glTF reader supports."""
-
-
-def add_skin(glb: Glb, skin: Skin, nodes: list[int], name: str) -> int:
-    """Add a doll's skin, Y up, with the nodes of its bones as joints; its node."""
-    weights = np.pad(skin.weights, ((0, 0), (0, max(0, INFLUENCES - skin.weights.shape[1]))))
-    joints = np.argsort(-weights, axis=1, kind='stable')[:, :INFLUENCES]
-    weights = np.take_along_axis(weights, joints, axis=1)
-    # The specification requires joint 0 where the weight is zero.
-    joints = np.where(weights > 0, joints, 0).astype(np.uint16)
-    weights = weights / weights.sum(axis=1, keepdims=True)
-    moved = {'JOINTS_0': glb.accessor(joints, ATTRIBUTES),
-             'WEIGHTS_0': glb.accessor(weights.astype(np.float32), ATTRIBUTES)}
-    inverses = glb.accessor(_inverse_binds(skin).astype(np.float32))
-    bound = glb.add('skins', joints=[nodes[bone] for bone in skin.bones],
-                    inverseBindMatrices=inverses)
-    mesh = glb.add('meshes', primitives=_primitives(
-        glb, skin, points_y_up(skin.vertices), {'NORMAL': points_y_up(skin_normals(skin))}, moved))
-    return glb.add('nodes', name=name, mesh=mesh, skin=bound)
 
 
 def surface_glb(skin: Skin) -> bytes:
@@ -41,7 +17,7 @@ def surface_glb(skin: Skin) -> bytes:
     glb = Glb()
     normals = skin_normals(skin)
     mesh = glb.add('meshes', primitives=_primitives(
-        glb, skin, skin.vertices, {'NORMAL': normals, '_NORMAL': normals}, {}))
+        glb, skin, {'NORMAL': normals, '_NORMAL': normals}))
     glb.document['scene'] = glb.add('scenes', nodes=[glb.add('nodes', mesh=mesh)])
     return glb.content()
 
@@ -75,13 +51,12 @@ def add_material(glb: Glb, color: tuple[float, ...]) -> int:
                                          'metallicFactor': 0.0, 'roughnessFactor': ROUGHNESS})
 
 
-def _primitives(glb: Glb, skin: Skin, points: np.ndarray, directions: dict[str, np.ndarray],
-                attributes: dict[str, int]) -> list[dict]:
+def _primitives(glb: Glb, skin: Skin, directions: dict[str, np.ndarray]) -> list[dict]:
     """A primitive for each material, all with the same vertices."""
-    given = {'POSITION': points, **directions}
+    given = {'POSITION': skin.vertices, **directions}
     if skin.appearance is not None:
         given['TEXCOORD_0'] = skin.appearance.uvs
-    attributes = attributes | {name: glb.accessor(values.astype(np.float32), ATTRIBUTES)
+    attributes = {name: glb.accessor(values.astype(np.float32), ATTRIBUTES)
                                for name, values in given.items()}
     triangles, runs = group_by_material(skin)
     taken = [] if skin.appearance is None else _add_materials(glb, skin.appearance)
@@ -113,16 +88,6 @@ def _with_textures(glb: Glb, entry: dict, textures: list[int]) -> dict:
             used = glb.document.setdefault('extensionsUsed', [])
             used += [name for name in value if name not in used]
     return made
-
-
-def _inverse_binds(skin: Skin) -> np.ndarray:
-    """Inverse bind matrices (b, 16), column by column."""
-    bound = Pose(points_y_up(skin.positions), orientations_y_up(skin.orientations))
-    inverses = np.zeros((len(skin.bones), 4, 4))
-    inverses[:, :3, :3] = rotation.matrix(rotation.inverse(bound.orientation))
-    inverses[:, :3, 3] = bound.apply_inverse(np.zeros(3))
-    inverses[:, 3, 3] = 1
-    return inverses.transpose(0, 2, 1).reshape(-1, 16)
 
 
 def smooth_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Subscriptions that drive motors: a JointState sets targets, a Float64 the strength."""
+"""Subscriptions that drive motors: they set targets and strengths."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -10,17 +10,19 @@ from std_msgs.msg import Float64
 from ...model import errors
 from ...physics.simulation import Simulation
 from .input_counts import InputCounts
-from .joint_values import joint_values
+from .joint_values import joint_efforts, joint_values
 
 TARGET, STRENGTH = '~/pose_target', '~/motor_strength'
 
+STRENGTHS = '~/joint_strengths'
+
 
 class MotorSubscriptions:
-    """Subscriptions to ~/pose_target and ~/motor_strength.
+    """Subscriptions to ~/pose_target, ~/motor_strength and ~/joint_strengths.
 
-    The former has names, positions and velocities as on joint_states, of any joints with motors;
-    positions or velocities may be left out, efforts are ignored. The latter sets the strength of
-    all motors, 0 to 1.
+    The first has names, positions and velocities as on joint_states, of any joints with motors;
+    positions or velocities may be left out, efforts are ignored. The second sets the strength of
+    all motors, 0 to 1; the third, as efforts, that of the motors of the joints or bones named.
     """
 
     def __init__(self, node: Node, counts: InputCounts) -> None:
@@ -28,6 +30,7 @@ class MotorSubscriptions:
         self.simulation: Simulation
         node.create_subscription(JointState, TARGET, self.on_pose_target, 10)
         node.create_subscription(Float64, STRENGTH, self.on_strength, 10)
+        node.create_subscription(JointState, STRENGTHS, self.on_joint_strengths, 10)
 
     def on_pose_target(self, message: JointState) -> None:
         """Set targets; a message that is wrong is refused and counted, all of it."""
@@ -36,6 +39,10 @@ class MotorSubscriptions:
     def on_strength(self, message: Float64) -> None:
         """Set the strength of all motors; what is no strength is refused and counted."""
         self._take(STRENGTH, lambda: self.simulation.set_strength(message.data))
+
+    def on_joint_strengths(self, message: JointState) -> None:
+        """Set strengths; a message that is wrong is refused and counted, all of it."""
+        self._take(STRENGTHS, lambda: self.simulation.set_strength(joint_efforts(message)))
 
     def _take(self, topic: str, act: Callable[[], None]) -> None:
         try:

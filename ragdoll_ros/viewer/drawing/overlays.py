@@ -64,8 +64,8 @@ class Overlays:
         self._pushes: tuple[Push, ...] = ()
         self._last_push = 0.0
 
-    def show(self, frame: Frame) -> None:
-        """Draw what a frame has, and hide the rest."""
+    def show(self, frame: Frame, rods: np.ndarray | None = None) -> None:
+        """Draw what a frame has, of its rods these (m, 2, 3) m, and hide the rest."""
         scene, state = frame.scene, frame.state
         now = time.monotonic()
         pushes = tuple(push for push in frame.pushes if any(push.force))
@@ -74,7 +74,7 @@ class Overlays:
         arrows = [arrow_to_surface(scene.bones[bone], push, state.positions[bone],
                                    state.orientations[bone])
                   for push in self._pushes for bone in (scene.bone_index(push.bone),)]
-        self._set('rods', frame.rods)
+        self._set('rods', rods)
         self._set('pushes', arrows)
         self._set('hands', [(grab.point, grab.target) for grab in frame.grabs])
         self._set('pointers', [grab.target for grab in frame.grabs])

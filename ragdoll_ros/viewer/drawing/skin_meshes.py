@@ -1,4 +1,4 @@
-"""Skins of fitted characters as skinned meshes, driven by the bones."""
+"""Skins of fitted characters as skinned meshes, driven by bones and by links of swings."""
 from __future__ import annotations
 
 import itertools
@@ -8,6 +8,8 @@ import viser
 
 from ...fit.skin import skin_of
 from ...model import errors
+from ...model.link_frames import LinkFrames
+from ...model.pose import Pose
 from ...model.scene import Scene
 from ...model.skeleton import Skin
 from ...model.state import State
@@ -26,15 +28,20 @@ the next one lacks, and draw nothing."""
 class SkinMeshes:
     """Skins of the first MAX_SKINS dolls of a scene that have one.
 
-    ``notes``: on skins that failed or are too many; ``skinned``: bones of dolls with a skin mesh.
+    ``notes``: on skins that failed or are too many; ``skinned``: bones of dolls with a skin mesh;
+    ``links``: those of swings that move one.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self.notes: list[str] = []
         self.handles: list[viser.MeshSkinnedHandle] = []
         self.skinned: set[int] = set()
-        self._bones: list[np.ndarray] = []
-        for placement, part in zip(scene.dolls, scene.bone_slices, strict=True):
+        self.links: list[int] = []
+        self._frames = LinkFrames(scene)
+        self._skins: list[tuple[Skin, slice, slice]] = []
+        """With the doll's ranges among bones and links."""
+        for placement, part, links in zip(scene.dolls, scene.bone_slices, scene.link_slices,
+                                          strict=True):
             try:
                 skin = skin_of(placement.doll)
             except errors.RagdollError as error:
@@ -46,16 +53,23 @@ class SkinMeshes:
                 self.notes.append(f'skins of {MAX_SKINS} dolls: the others show their bones')
                 break
             self._add(server, next(NAMES), skin)
-            self._bones.append(part.start + skin.bones)
+            self._skins.append((skin, part, links))
+            self.links += (links.start + skin.links).tolist()
             self.skinned.update(range(part.start, part.stop))
 
-    def show(self, state: State) -> None:
-        """Draw all skins at a state."""
-        for handle, bones in zip(self.handles, self._bones, strict=True):
-            positions = state.positions[bones].tolist()
-            wxyzs = state.orientations[bones][:, WXYZ].tolist()
-            for bone, position, wxyz in zip(handle.bones, positions, wxyzs, strict=True):
-                bone.position, bone.wxyz = tuple(position), tuple(wxyz)
+    def show(self, state: State, rods: np.ndarray | None = None) -> None:
+        """Draw all skins at a state; ``rods`` (m, 2, 3) m are the swings', if they are known."""
+        if not self.handles:
+            return
+        bones = state.poses(slice(None))
+        links = self._frames.poses(bones, rods)
+        for handle, (skin, own, swings) in zip(self.handles, self._skins, strict=True):
+            poses = skin.joint_poses(Pose(*(part[own] for part in bones)),
+                                     Pose(*(part[swings] for part in links)))
+            positions = poses.position.tolist()
+            wxyzs = poses.orientation[:, WXYZ].tolist()
+            for joint, position, wxyz in zip(handle.bones, positions, wxyzs, strict=True):
+                joint.position, joint.wxyz = tuple(position), tuple(wxyz)
 
     def set_visible(self, visible: bool) -> None:
         """Show or hide the skins."""

@@ -51,12 +51,16 @@ class Stage:
         self.bodies = Bodies(server, self.scene, frame.state, self.skins.skinned)
         self._overlays = Overlays(server)
         self._limits = JointLimits(server, self.scene)
+        self._shows_rods_in_skins = False
 
     def show(self, frame: Frame) -> None:
         """Draw a frame of the scene."""
         self.bodies.show(frame.state)
-        self.skins.show(frame.state)
-        self._overlays.show(frame)
+        self.skins.show(frame.state, frame.rods)
+        rods = frame.rods
+        if rods is not None and not self._shows_rods_in_skins:
+            rods = np.delete(rods, self.skins.links, axis=0)
+        self._overlays.show(frame, rods)
         self._limits.show(frame.state, frame.angles)
 
     def set_dark(self, dark: bool) -> None:
@@ -66,7 +70,11 @@ class Stage:
             draw_ground(self._server, self.scene, dark)
 
     def set_visible(self, bones: bool, skins: bool) -> None:
-        """Show or hide bones and skins; bones are shown at least where skins are hidden."""
+        """Show or hide bones and skins; bones are shown at least where skins are hidden.
+
+        So are the rods of swings that move a skin.
+        """
+        self._shows_rods_in_skins = bones or not skins
         self.bodies.set_visible(bones or not skins, translucent=skins)
         self.skins.set_visible(skins)
 

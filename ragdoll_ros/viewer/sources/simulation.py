@@ -122,6 +122,9 @@ class SimulationSource(Source):
     def go_limp(self) -> None:
         self._commands.put(lambda: self._simulation.go_limp())
 
+    def set_strength(self, strength: float) -> None:
+        self._commands.put(lambda: self._simulation.set_strength(strength))
+
     def set_real_time_factor(self, factor: float) -> None:
         errors.check_range('real_time_factor', factor, *REAL_TIME_FACTORS)
         self._commands.put(lambda: self._update_status(real_time_factor=factor))

@@ -153,6 +153,9 @@ class Source(Protocol):
     def go_limp(self) -> None:
         """Let all dolls go limp that animations or motors move."""
 
+    def set_strength(self, strength: float) -> None:
+        """Set the strength of all motors, 0 to 1, until the next reset."""
+
     def set_real_time_factor(self, factor: float) -> None:
         """Set the simulated time per wall time."""
 

@@ -6,7 +6,6 @@ import io
 import zipfile
 from pathlib import Path
 
-from ...fit.skin import skins_of
 from ...recordings.recording import Recording
 from ...recordings.save import FORMATS, encoded_files
 
@@ -16,13 +15,13 @@ CAN_WRITE_MCAP = importlib.util.find_spec('mcap') is not None
 def export_zip(recording: Recording) -> bytes:
     """A ZIP file of a run in all formats that can be written here.
 
-    A doll whose skin cannot be loaded is exported with its bones; the page shows the reason.
+    A character whose file cannot be read is exported as its doll; the page shows the reason.
     """
-    skins = skins_of(recording.scene, lambda _: None)
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, 'w', zipfile.ZIP_DEFLATED) as archive:
         for suffix in FORMATS:
             if suffix != '.mcap' or CAN_WRITE_MCAP:
-                for path, content in encoded_files(recording, Path('run' + suffix), skins).items():
+                found = encoded_files(recording, Path('run' + suffix), lambda _: None)
+                for path, content in found.items():
                     archive.writestr(str(path), content)
     return stream.getvalue()

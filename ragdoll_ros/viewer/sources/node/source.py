@@ -20,7 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 
 from ....files.scene import save_scene
 from ....model import errors
@@ -78,6 +78,7 @@ class NodeSource(Source):
         self._inputs: PushSubscriptions | None = None
         self._force = ForcePublisher(self._node, NAME)
         self._states = StatePublisher(self._node, NAME)
+        self._strength = self._node.create_publisher(Float64, f'{NAME}/motor_strength', 10)
         self._requested = RequestedData()
         self._reported = SourceStatus()
         self._simulated_time = 0.0
@@ -141,6 +142,9 @@ class NodeSource(Source):
 
     def go_limp(self) -> None:
         self._services.trigger('go_limp')
+
+    def set_strength(self, strength: float) -> None:
+        self._strength.publish(Float64(data=float(strength)))
 
     def set_real_time_factor(self, factor: float) -> None:
         self._services.set_parameter('real_time_factor', float(factor))

@@ -1,4 +1,4 @@
-"""Swings on bones."""
+"""Swings mounted on bones: roots and directions in the bones' frames."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model import rotation
-from ...model.ragdoll import Bone
-from ...model.scene import Scene
-from ...model.swing import Swing
+from . import rotation
+from .ragdoll import Bone
+from .scene import Scene
+from .swing import Swing
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,13 @@ class SwingMount:
         back = rotation.inverse(np.array(bone.orientation))
         return cls(swing, index, name or swing.name, bone.pose.apply_inverse(swing.root),
                    rotation.rotate(back, np.array(swing.directions())))
+
+    @property
+    def link_roots(self) -> np.ndarray:
+        """Root (links, 3) m of each link at rest, in the bone's frame."""
+        lengths = np.array([link.length for link in self.swing.links])
+        steps = self.directions * lengths[:, None]
+        return self.root + np.cumsum(steps, axis=0) - steps
 
     @property
     def names(self) -> list[str]:
