@@ -287,3 +287,27 @@ def test_a_file_keeps_it(tmp_path):
     save_scene(scene, tmp_path / 'hung.yaml')
     assert 'fixed_root: true' in (tmp_path / 'hung.yaml').read_text()
     assert load_scene(tmp_path / 'hung.yaml').dolls[0].fixed_root
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
+def test_an_arm_gives_way_at_its_torque(accuracy):
+    """An arm is told to go through a fixed ball: it presses with the force of its torque over the
+    lever, and no more.
+    """
+    arm = Bone('arm', Capsule(0.02, 0.3), 1.0, (0, 0, -0.2))
+    doll = Ragdoll('arm', (Bone('post', Sphere(0.02), 1.0, (0, 0, 0)), arm), (
+        Joint('post', 'arm', 'hinge', (0, 0, 0), ((0, 1, 0),), ((-3, 3),)),))
+    ball = StaticBody('ball', Sphere(0.03), position=(-0.08, 0, -0.15))
+    scene = Scene('press', (Placement(doll, fixed_root=True, motors=Motors(
+        frequency=5, max_torque=1.2)),), None, Material(friction=0, restitution=0),
+        gravity=(0, 0, 0), bodies=(ball,))
+    with Simulation(scene, accuracy=accuracy) as simulation:
+        simulation.set_pose_target({'arm': 1.5})
+        simulation.run(100)
+        contacts, angle = simulation.contacts, float(simulation.joint_angles[0])
+    # The line of the capsule touches the ball where its distance from the ball's centre is that of
+    # both radii; the lever is the distance of the foot of that perpendicular from the axis.
+    distance = math.hypot(0.08, 0.15)
+    assert angle == pytest.approx(math.atan2(0.08, 0.15) - math.asin(0.05 / distance), abs=1e-5)
+    assert contacts.forces.sum() == pytest.approx(1.2 / math.sqrt(distance ** 2 - 0.05 ** 2),
+                                                  rel=1e-3)

@@ -18,6 +18,7 @@ import pytest
 import ragdoll_ros
 from ragdoll_ros.falls import generate, load_recipe
 from ragdoll_ros.falls.formats.registry import FORMATS
+from ragdoll_ros.fit.command import main as fit_main
 
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN_BY_PROGRAMS = {'docs/accuracy.md', 'docs/starts/accuracy.md'}
@@ -164,6 +165,11 @@ def test_falls_part_at_the_touch():
 def test_yaml_is_a_scene_a_doll_a_recipe_or_limits(tmp_path, text):
     path = tmp_path / 'mine.yaml'
     path.write_text(text)
+    for command in re.findall(r'^ragdoll_fit (\w+\.urdf) -o (\w+\.yaml)$',
+                              '\n'.join(PAGES.values()), re.M):
+        if command[1] in text:
+            assert fit_main([str(ROOT / 'config' / command[0]), '-o',
+                             str(tmp_path / command[1])]) == 0
     if re.search('^who:', text, re.M):
         assert next(generate(load_recipe(path), [0])).failure == ''
         return

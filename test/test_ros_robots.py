@@ -13,6 +13,7 @@ from test_robot_motion import PLANAR, tip, yaw
 from test_ros_set_state import odometry
 
 from ragdoll_ros import Simulation, load_scene
+from ragdoll_ros.fit.command import main as fit_main
 from ragdoll_ros.physics.logged_simulation import apply_event, state_digest
 
 SCENE = """ground: {}
@@ -189,3 +190,63 @@ def test_the_scene_of_a_run_is_equal(node, tmp_path):
     from ragdoll_ros.files.run_scene import read_run_scene, run_scene_text
     read, _ = read_run_scene(run_scene_text(node.simulation.scene))
     assert read == node.simulation.scene == load_scene(str(tmp_path / 'robot.yaml'))
+
+
+GENTLE = """ground: null
+gravity: [0, 0, 0]
+material: {friction: 0, restitution: 0}
+dolls:
+  - {doll: doll, position: [0, 3, 0.05]}
+  - {doll: arm.yaml, name: arm, position: [0, 0, 1], fixed_root: true,
+     motors: {frequency: 1, max_torque: 3}}
+bodies: [{name: pole, shape: {cylinder: {radius: 0.05, length: 1}}, position: [0.4, 0.2, 1]}]
+"""
+
+
+def test_joint_states_move_an_arm_that_gives_way(make_node, peer, tmp_path):
+    """A fitted doll on a fixed root: its motors follow the robot's own joint names, other joints
+    are left out, a pole stops it at the torque of the motor, and events repeat the run.
+    """
+    (tmp_path / 'r.urdf').write_text(PLANAR.replace('<link name="foot"/>', FOOT))
+    assert fit_main([str(tmp_path / 'r.urdf'), '-o', str(tmp_path / 'arm.yaml')]) == 0
+    (tmp_path / 'gentle.yaml').write_text(GENTLE)
+    node = make_node(scene=str(tmp_path / 'gentle.yaml'), start_paused=True)
+    peer.executor_.add_node(node)
+    heard = peer.collect(String, '/ragdoll/events')
+    states = peer.sender(JointState, '/ragdoll/bodies/arm/joint_states')
+    states.publish(joints(('shoulder', 'elbow', 'finger'), (-0.4, 0.3, 0.1)))
+
+    def targets():
+        return {each.angle: each.target for each in node.simulation.holds}
+
+    peer.wait(lambda: targets() == pytest.approx({'arm/shoulder': -0.4, 'arm/elbow': 0.3}))
+    for _ in range(400):
+        node.tick()
+    assert node.simulation.joint_angles[-2:] == pytest.approx([-0.4, 0.3], abs=1e-3)
+    states.publish(joints(('shoulder', 'elbow'), (math.tau + 1.2, 0.0)))
+    peer.wait(lambda: targets()['arm/shoulder'] == pytest.approx(1.2))
+    for _ in range(300):
+        node.tick()
+    contacts = node.simulation.contacts
+    # The arm, 0.02 m thick, leans on the pole; the lever is that of the contact's normal.
+    lever = np.cross(contacts.positions - (0, 0, 1), contacts.normals)[:, 2]
+    assert abs((contacts.forces * lever).sum()) == pytest.approx(3, rel=1e-2)
+    assert not node.input_counts.refused
+    def told():
+        events = (json.loads(message.data) for _, message in heard)
+        return [event for event in events if event['kind'] == 'set_pose_target']
+
+    peer.wait(lambda: len(told()) == 2)
+    with Simulation(load_scene(str(tmp_path / 'gentle.yaml'))) as again:
+        for event in told():
+            while again.time < event['tick'] * again.tick:
+                again.advance()
+            apply_event(again, event['kind'], {
+                key: event[key] for key in event.keys() - {'number', 'tick', 'kind'}})
+        while again.time < node.simulation.time:
+            again.advance()
+        assert state_digest(again.state) == state_digest(node.simulation.state)
+
+
+FOOT = """<link name="foot"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>
+</link>"""

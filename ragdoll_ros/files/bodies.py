@@ -106,7 +106,7 @@ def _robot(entry: dict, folder: Path, where: str, found: list[ModelError]) -> Pl
                                    'none: a robot never moves, or as it is told, by `follow`'))
     if entry.get('follow', EXACT) != EXACT:
         found.append(WrongForm(f'{where}.follow', entry['follow'],
-                               'exact: forces move no robot of several links'))
+                               'exact; as a doll with fixed_root and motors a robot gives way'))
     robot, more = read_robot(entry, folder)
     found += [error.at(where) for error in more]
     return robot

@@ -1,9 +1,10 @@
 """Subscriptions that move bodies with `follow`, and robots: Odometry, a Twist or a JointState
-becomes drive_body().
+becomes drive_body(), or set_pose_target() where a robot is a doll on a fixed root.
 """
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -16,6 +17,7 @@ from sensor_msgs.msg import JointState
 
 from ....model import errors, rotation
 from ....model.drive import MAX_SPEED
+from ....model.scene import Scene
 from ....model.vectors import unit_vector
 from ....physics.simulation import Simulation
 from ...messages.convert import from_time
@@ -31,7 +33,8 @@ JOINTS = 'joint_states'
 
 class BodySubscriptions:
     """Subscriptions to ~/bodies/<name>/odom and ~/bodies/<name>/cmd_vel, for each driven body and
-    robot, to ~/bodies/<name>/joint_states, for each robot, and to /tf, where bodies follow frames.
+    robot, to ~/bodies/<name>/joint_states, for each robot and each doll with motors on a fixed
+    root, and to /tf, where bodies follow frames.
 
     A pose is that of the body's frame in the world frame, whatever the message calls its frames: a
     robot's odometry has names of its own. Twists are along the body's axes, as nav_msgs and REP 103
@@ -49,7 +52,7 @@ class BodySubscriptions:
         self._subscriptions: dict[str, list[Subscription]] = {}
         """By the name of the body or robot."""
         self._names: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
-        """Of all that is driven, and of robots."""
+        """Of all that is driven, and of what has joints."""
         self._frames = BodyFrames(node, self._drive_by_frame, counts.refuse)
         self.simulation: Simulation
 
@@ -57,7 +60,9 @@ class BodySubscriptions:
         """Move the bodies of this simulation, and subscribe for those of its scene."""
         self.simulation, scene = simulation, simulation.scene
         self.configure(settings)
-        names = scene.driven_names, tuple(robot.name for robot in scene.robots)
+        names = scene.driven_names, (*(robot.name for robot in scene.robots), *(
+            placement.name for placement in scene.dolls
+            if placement.fixed_root and placement.motors))
         if names == self._names:
             return
         for subscription in itertools.chain(*self._subscriptions.values()):
@@ -69,7 +74,7 @@ class BodySubscriptions:
             for kind, end, callback, own in ((JointState, JOINTS, self.on_joint_states, names[1]),
                                              (Odometry, 'odom', self.on_odometry, names[0]),
                                              (Twist, 'cmd_vel', self.on_cmd_vel, names[0]))
-            if name in own] for name in names[0]}
+            if name in own] for name in dict.fromkeys((*names[0], *names[1]))}
 
     def topics(self, name: str) -> list[str]:
         """Topics that move a body or robot, as they are remapped."""
@@ -105,9 +110,7 @@ class BodySubscriptions:
         """
         try:
             angles, rates = joint_values(message)
-            known = {joint.name: joint.kind == 'continuous'
-                     for robot in self.simulation.scene.robots if robot.name == name
-                     for joint in robot.joints if joint.kind != 'fixed'}
+            known = turning_joints(self.simulation.scene, name)
             if known.keys() & set(message.name):
                 self._note_unknown(name, [each for each in message.name if each not in known])
                 angles, rates = ({joint: value for joint, value in values.items() if joint in known}
@@ -115,12 +118,29 @@ class BodySubscriptions:
             stamp = from_time(message.header.stamp)
             rates = rates or self._times.rates(name, stamp, angles, known)
             lead = self._times.lead(stamp)
-            self.simulation.drive_body(name, rates=rates, joint_angles={
-                joint: angle + lead * rates.get(joint, 0.0) for joint, angle in angles.items()})
+            angles = {joint: angle + lead * rates.get(joint, 0.0)
+                      for joint, angle in angles.items()}
+            if any(robot.name == name for robot in self.simulation.scene.robots):
+                self.simulation.drive_body(name, rates=rates, joint_angles=angles)
+            else:
+                self._aim(name, angles, rates, known)
         except errors.ModelError as error:
             self._counts.refuse(f'{body_topic(name)}/{JOINTS}', error)
         else:
             self._after()
+
+    def _aim(self, name: str, angles: dict[str, float], rates: dict[str, float],
+             known: dict[str, bool]) -> None:
+        """Set targets of a doll's motors; a joint that turns without end goes the shorter way."""
+        scene = self.simulation.scene
+        placement, = (each for each in scene.dolls if each.name == name)
+        present = dict(zip(scene.angle_names, self.simulation.joint_angles.tolist(), strict=True))
+        own = {joint: scene.qualified(placement, joint) for joint in {*angles, *rates}}
+        for joint in angles:
+            if known.get(joint):
+                angles[joint] += math.tau * round((present[own[joint]] - angles[joint]) / math.tau)
+        self.simulation.set_pose_target(*({own[joint]: value for joint, value in values.items()}
+                                          for values in (angles, rates)))
 
     def _note_unknown(self, name: str, joints: list[str]) -> None:
         """Log, once for each, joints that the robot of this name does not have."""
@@ -147,6 +167,15 @@ class BodySubscriptions:
         moves = [*parts[0].tolist(), *parts[1].tolist()]
         self.simulation.drive_body(name, pose and carried_on(pose, moves, lead), moves)
         self._after()
+
+
+def turning_joints(scene: Scene, name: str) -> dict[str, bool]:
+    """Names of the joints of a robot, or of a doll, and whether each turns without end."""
+    found = {joint.name: joint.kind == 'continuous' for robot in scene.robots if robot.name == name
+             for joint in robot.joints if joint.kind != 'fixed'}
+    return found | {angle: limits is None for placement in scene.dolls if placement.name == name
+                    for joint in placement.doll.joints for angle, limits in zip(
+                        joint.angle_names, joint.angle_limits, strict=True)}
 
 
 def body_topic(name: str) -> str:
