@@ -17,7 +17,7 @@ from .collide import advance_among
 from .colliders import move_out
 from .link_step import (limited, outward, place, root_forces, root_frame, set_response, step_link,
                         tip_frame)
-from .links import COLLIDER, LINK, LINK_STATE, RESPONSE, Chains, Frame
+from .links import COLLIDER, LINK, LINK_STATE, RESPONSE, Around, Chains, Frame
 
 MAX_SUBSTEPS = 64
 
@@ -108,8 +108,8 @@ def begin_chains(chains: Chains, states: np.ndarray, bones: np.ndarray, has_dire
         if not has_rates:
             put(state.rate, vec(state.drift))
         if chains.firsts[chain] < chains.lasts[chain]:
-            move_out(link, state, frame, chains.colliders, chains.firsts[chain],
-                     chains.lasts[chain], bones)
+            move_out(link, state, frame, Around(chains.colliders, chains.firsts[chain],
+                                                chains.lasts[chain], bones, bones, True))
 
 
 @entry(CHAINS, STATES, KNOTS, ROWS, NUMBER, INDEX, INDEX, NUMBER)
@@ -133,7 +133,7 @@ def advance_chains(chains: Chains, states: np.ndarray, knots: np.ndarray, rows: 
         for chain in range(len(starts)):
             start, stop = starts[chain], ends[chain]
             if firsts[chain] < lasts[chain]:
-                advance_among(chains, states, chain, origin + index * h, h, knots, rows, most)
+                advance_among(chains, states, chain, origin + index * h, h, knots, rows)
                 continue
             link = links[start]
             frame = root_frame(link, roots[link.bone], matrix)

@@ -1,6 +1,9 @@
 """A chain among colliders over an interval of the grid, divided where a tip arrives at one."""
 from __future__ import annotations
 
+import collections
+import math
+
 import numpy as np
 
 from ..compiling.decorators import compiled
@@ -8,7 +11,10 @@ from ..maths.vectors import add_scaled, norm, put, vec
 from .bone_path import set_bones
 from .colliders import FREE, TOUCH, contact, copy_state, step_touching
 from .link_step import limited, root_forces, root_frame, set_response, tip_frame
-from .links import Chains
+from .links import Around, Chains
+
+Path = collections.namedtuple('Path', 'origin knots rows')
+"""The path of bones from the instant ``origin`` s on; see set_bones()."""
 
 MAX_ARRIVALS = 16
 """In an interval; after them all colliders hold a tip without a search for its arrival."""
@@ -37,11 +43,13 @@ def longest_step(chains: Chains, states: np.ndarray, chain: int) -> float:
 
 @compiled
 def try_step(chains: Chains, states: np.ndarray, chain: int, h: float, bones_before: np.ndarray,
-             bones: np.ndarray, most: float, holds_all: bool) -> float:
+             bones: np.ndarray, holds_all: bool) -> float:
     """Step a chain from chains.before by ``h`` s; the least gap, m, to what it did not touch."""
     links, responses, before = chains.links, chains.part_responses, chains.before
-    first, until = chains.firsts[chain], chains.lasts[chain]
     start, stop = chains.starts[chain], chains.ends[chain]
+    around = Around(chains.colliders, chains.firsts[chain], chains.lasts[chain], bones_before,
+                    bones, holds_all)
+    most = math.pi / chains.responses[0].h
     matrix = np.empty((3, 3))
     frame = root_frame(links[start], bones[links[start].bone], matrix)
     least = FREE
@@ -52,7 +60,7 @@ def try_step(chains: Chains, states: np.ndarray, chain: int, h: float, bones_bef
         copy_state(before[k], states[k])
         forces = root_forces(links[k], responses[k], states[k], frame)
         gap = step_touching(links[k], responses[k], before[k], states[k], frame, forces,
-                            chains.colliders, first, until, bones_before, bones, holds_all)
+                            around)
         if k > start:
             put(states[k].rate, limited(vec(states[k].rate), most))
         least = min(least, gap)
@@ -73,20 +81,19 @@ def gap_before(chains: Chains, chain: int, bones: np.ndarray) -> float:
 
 
 @compiled
-def step_to_arrival(chains: Chains, states: np.ndarray, chain: int, origin: float, h: float,
-                    knots: np.ndarray, rows: np.ndarray, bones_before: np.ndarray,
-                    bones: np.ndarray, most: float, high_gap: float) -> float:
-    """Step a chain to the first instant at which a tip touches what it did not, s after ``origin``;
-    ``high_gap``: at the end of ``h`` s. By regula falsi with the factors of Illinois.
+def step_to_arrival(chains: Chains, states: np.ndarray, chain: int, high: float, high_gap: float,
+                    bones_before: np.ndarray, bones: np.ndarray, path: Path) -> float:
+    """Step a chain to the first instant, s, at which a tip touches what it did not, before
+    ``high``, where the gap is ``high_gap``. By regula falsi with the factors of Illinois.
     """
-    low, low_gap, high, span = 0.0, gap_before(chains, chain, bones_before), h, h
+    low, low_gap, span = 0.0, gap_before(chains, chain, bones_before), high
     side = 0
     for search in range(SEARCHES):
         share = low_gap / (low_gap - high_gap)
         # Where gaps of several tips change places, bisection goes on.
         span = low + (high - low) * (share if search < SEARCHES // 2 else 0.5)
-        set_bones(origin + span, knots, rows, bones)
-        gap = try_step(chains, states, chain, span, bones_before, bones, most, False)
+        set_bones(path.origin + span, path.knots, path.rows, bones)
+        gap = try_step(chains, states, chain, span, bones_before, bones, False)
         if abs(gap) <= TOUCH:
             break
         if gap > 0:
@@ -102,7 +109,7 @@ def step_to_arrival(chains: Chains, states: np.ndarray, chain: int, origin: floa
 
 @compiled
 def advance_among(chains: Chains, states: np.ndarray, chain: int, origin: float, h: float,
-                  knots: np.ndarray, rows: np.ndarray, most: float) -> None:
+                  knots: np.ndarray, rows: np.ndarray) -> None:
     """Integrate a chain among its colliders from ``origin`` s over ``h`` s; scratch: ``before``."""
     start, stop = chains.starts[chain], chains.ends[chain]
     bones_before, bones = np.empty_like(chains.roots), np.empty_like(chains.roots)
@@ -113,11 +120,11 @@ def advance_among(chains: Chains, states: np.ndarray, chain: int, origin: float,
             copy_state(states[k], chains.before[k])
         span = min(h - done, max(longest_step(chains, states, chain), h / MAX_PARTS))
         set_bones(origin + done + span, knots, rows, bones)
-        gap = try_step(chains, states, chain, span, bones_before, bones, most,
+        gap = try_step(chains, states, chain, span, bones_before, bones,
                        arrivals >= MAX_ARRIVALS)
         if gap < -TOUCH and arrivals < MAX_ARRIVALS:
-            span = step_to_arrival(chains, states, chain, origin + done, span, knots, rows,
-                                   bones_before, bones, most, gap)
+            span = step_to_arrival(chains, states, chain, span, gap, bones_before, bones,
+                                   Path(origin + done, knots, rows))
             arrivals += 1
         done = h if span == h - done else done + span
         bones_before[:] = bones

@@ -23,7 +23,7 @@ from ..maths.vectors import (Vec3, add, add_scaled, cross, dot, norm, put, quat_
                              vec)
 from .bone_path import orientation_of
 from .link_step import place, step_link, tangential
-from .links import Frame
+from .links import Around, Frame
 from .sphere import exp_map
 
 TOUCH = 2e-5
@@ -109,12 +109,12 @@ def stop_at(link: np.ndarray, state: np.ndarray, collider: np.ndarray, bone: np.
 
 
 @compiled
-def move_out(link: np.ndarray, state: np.ndarray, frame: Frame, colliders: np.ndarray, first: int,
-             until: int, bones: np.ndarray) -> None:
-    """Turn a link until its tip is outside of the colliders from ``first`` to ``until``."""
+def move_out(link: np.ndarray, state: np.ndarray, frame: Frame, around: Around) -> None:
+    """Turn a link until its tip is outside of the colliders where they are after the step."""
+    colliders, bones = around.colliders, around.after
     for _ in range(SWEEPS):
         is_inside = False
-        for k in range(first, until):
+        for k in range(around.first, around.until):
             gap, out, angle, _, _ = contact(link, state, colliders[k], bones[colliders[k].bone])
             if gap < -ACCURACY:
                 is_inside = True
@@ -127,36 +127,35 @@ def move_out(link: np.ndarray, state: np.ndarray, frame: Frame, colliders: np.nd
 
 @compiled
 def step_touching(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np.ndarray,
-                  frame: Frame, forces: tuple[Vec3, Vec3], colliders: np.ndarray, first: int,
-                  until: int, bones_before: np.ndarray, bones: np.ndarray,
-                  holds_all: bool) -> float:
+                  frame: Frame, forces: tuple[Vec3, Vec3], around: Around) -> float:
     """Integrate a link over one step from the state ``before``, which ``state`` equals, held
     outside of those colliders that it touches there, or of all; the least gap, m, to the others.
     """
+    colliders, bones_before, bones = around.colliders, around.before, around.after
     step_link(link, r, state, frame, forces)
     least, is_inside = FREE, False
-    for k in range(first, until):
+    for k in range(around.first, around.until):
         gap = contact(link, state, colliders[k], bones[colliders[k].bone])[0]
         if gap < TOUCH:
             was = contact(link, before, colliders[k], bones_before[colliders[k].bone])[0]
-            if was <= TOUCH or holds_all:
+            if was <= TOUCH or around.holds_all:
                 is_inside = is_inside or gap < -ACCURACY
                 continue
         least = min(least, gap)
     if is_inside:
-        hold(link, r, before, state, frame, forces, colliders, first, until, bones_before, bones,
-             holds_all)
+        hold(link, r, before, state, frame, forces, around)
     else:
-        for k in range(first, until):
+        for k in range(around.first, around.until):
             stop_at(link, state, colliders[k], bones[colliders[k].bone], False)
     return least
 
 
 @compiled
 def hold(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np.ndarray, frame: Frame,
-         forces: tuple[Vec3, Vec3], colliders: np.ndarray, first: int, until: int,
-         bones_before: np.ndarray, bones: np.ndarray, holds_all: bool) -> None:
+         forces: tuple[Vec3, Vec3], around: Around) -> None:
     """Repeat a step with the forces of the colliders that the tip touches; see step_touching()."""
+    colliders, bones_before, bones = around.colliders, around.before, around.after
+    first, until = around.first, around.until
     held = np.zeros(until - first)
     push = (0.0, 0.0, 0.0)
     for _ in range(SWEEPS):
@@ -167,7 +166,7 @@ def hold(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np.ndarray,
             if gap >= -ACCURACY and (held[k - first] == 0 or gap <= ACCURACY):
                 continue
             was, normal, _, _, _ = contact(link, before, collider, bones_before[collider.bone])
-            if was > TOUCH and not holds_all:
+            if was > TOUCH and not around.holds_all:
                 continue
             share = dot(normal, out)
             more = angle / ((r.x_start + r.x_end) * max(share, LEAST_SHARE))
@@ -189,7 +188,7 @@ def hold(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np.ndarray,
     # The second half of the force is along the normal at the end: what stops the tip there.
     put(state.rate, add_scaled(vec(state.rate), -r.end_force,
                                tangential(vec(state.direction), push)))
-    move_out(link, state, frame, colliders, first, until, bones)
+    move_out(link, state, frame, around)
     for _ in range(SWEEPS):
         for k in range(first, until):
             stop_at(link, state, colliders[k], bones[colliders[k].bone], held[k - first] > 0)

@@ -56,5 +56,10 @@ grid. Scratch: ``part_responses`` (m,) to other steps; ``roots`` (b, 13) states 
 carry swings or colliders. ``colliders`` COLLIDER, chain by chain, of each from ``firsts`` (c,) to
 ``lasts`` (c,), as starts and ends; scratch for them: ``before`` (m,) LINK_STATE."""
 
+Around = collections.namedtuple('Around', 'colliders first until before after holds_all')
+"""What is around a chain in a step: ``colliders`` COLLIDER, its own from ``first`` to ``until``;
+states (b, 13) of the bones ``before`` and ``after`` the step; whether all colliders hold tips
+outside (``holds_all``), or those that they touch."""
+
 Frame = collections.namedtuple('Frame', 'point velocity x y z spin')
 """A frame, world: its origin, m, and velocity, m/s; its axes; its angular velocity, rad/s."""
