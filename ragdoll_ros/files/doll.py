@@ -12,7 +12,7 @@ from ..model.passive import Passive, PassiveEnd
 from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Part, Shape
-from ..model.swing import Link, Swing, strand
+from ..model.swing import Collider, Link, Swing, strand
 from . import yaml_text
 from .schema import (
     Made,
@@ -92,6 +92,7 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
             found += ragdoll.no_collision_errors(names, data.get('no_collision', ()))
             found += ragdoll.angle_name_errors(joints) + mass_errors(bones)
             found += ragdoll.link_rider_errors(swings, riders)
+            found += ragdoll.collider_errors(swings, names)
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None
@@ -264,7 +265,9 @@ def _swing(data: dict) -> Swing:
     else:
         links = tuple(_at(f'links[{index}]', Link, entry)
                       for index, entry in enumerate(fields.pop('links')))
-    return Swing(links=links, **fields)
+    colliders = tuple(_at(f'colliders[{index}]', Collider, entry)
+                      for index, entry in enumerate(fields.pop('colliders', ())))
+    return Swing(links=links, colliders=colliders, **fields)
 
 
 def _swing_data(swing: Swing) -> dict:
@@ -274,7 +277,16 @@ def _swing_data(swing: Swing) -> dict:
         data['velocity'] = list(swing.velocity)
     if swing.independent:
         data['independent'] = True
+    if swing.colliders:
+        data['colliders'] = [_collider_data(collider) for collider in swing.colliders]
     data['links'] = [_link_data(link) for link in swing.links]
+    return data
+
+
+def _collider_data(collider: Collider) -> dict:
+    data = {'bone': collider.bone, 'radius': collider.radius, 'at': list(collider.at)}
+    if collider.to is not None:
+        data['to'] = list(collider.to)
     return data
 
 
@@ -282,6 +294,8 @@ def _link_data(link: Link) -> dict:
     data = {key: getattr(link, key) for key in ('length', 'mass', 'stiffness', 'damping')}
     if link.direction is not None:
         data['direction'] = list(link.direction)
+    if link.radius:
+        data['radius'] = link.radius
     if link.riders:
         data['riders'] = list(link.riders)
     return data

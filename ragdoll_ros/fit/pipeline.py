@@ -14,7 +14,7 @@ from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll, SkeletonFrame
 from ..model.scene import Placement
 from ..model.shapes import Shape
-from ..model.swing import Swing
+from ..model.swing import Collider, Swing
 from .bodies.masses import share_mass
 from .bodies.overlap import colliding_overlaps
 from .bodies.subdivide import subdivide
@@ -23,6 +23,7 @@ from .joints.folding import note_guesses
 from .joints.make_joint import make_joint, with_damping
 from .reading.character import Character
 from .reading.spring_bones import SpringBone, drop_short_segments
+from .reading.spring_colliders import SpringCollider, has_size
 from .reading.spring_to_swing import swing_from_spring
 from .shapes.axes import Axes, fit_axes
 from .shapes.fitting import DECIMALS, TOLERANCE, FittedShape, fit_best, fit_shape
@@ -313,9 +314,18 @@ def _swings(character: Character, carrier: dict[int, Bone], links: dict[int, tup
         swing, cut = swing_from_spring(spring, carrier[spring.carrier].name, character.scale)
         riders = [tuple(character.bone_names[bone] for bone, of in links.items()
                         if of == (number, link)) for link in range(len(swing.links))]
-        made.append(replace(swing, links=tuple(
-            replace(link, riders=own) for link, own in zip(swing.links, riders, strict=True))))
+        colliders = tuple(_collider(collider, carrier[collider.bone].name)
+                          for collider in spring.colliders if has_size(collider))
+        made.append(replace(swing, colliders=colliders, links=tuple(
+            replace(link, riders=own, radius=round(joint.radius * character.scale, DECIMALS)
+                    if colliders else 0.0)
+            for link, own, joint in zip(swing.links, riders, spring.joints, strict=True))))
         if cut:
             notes.append(f'gravity of spring {spring.name} is clamped to a factor of '
                          f'{swing.gravity:g}')
     return tuple(made)
+
+
+def _collider(collider: SpringCollider, bone: str) -> Collider:
+    at, to = np.round(collider.axis, DECIMALS) + 0.0
+    return Collider(bone, round(collider.radius, DECIMALS), at, None if (at == to).all() else to)

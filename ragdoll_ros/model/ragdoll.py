@@ -299,6 +299,7 @@ class Ragdoll:
         found += no_collision_errors(names, self.no_collision)
         found += angle_name_errors(self.joints)
         found += link_rider_errors(self.swings, self.riders)
+        found += collider_errors(self.swings, names)
         for error in found:
             raise error
 
@@ -384,8 +385,9 @@ class Ragdoll:
             joint, parent=rename(joint.parent), child=rename(joint.child),
             names=tuple(map(rename, joint.names))) for joint in self.joints)
         pairs = tuple((rename(first), rename(second)) for first, second in self.no_collision)
-        swings = tuple(dataclasses.replace(swing, bone=rename(swing.bone))
-                       for swing in self.swings)
+        swings = tuple(dataclasses.replace(swing, bone=rename(swing.bone), colliders=tuple(
+            dataclasses.replace(collider, bone=rename(collider.bone))
+            for collider in swing.colliders)) for swing in self.swings)
         riders = tuple(dataclasses.replace(rider, bone=rename(rider.bone))
                        for rider in self.riders)
         return dataclasses.replace(self, bones=bones, joints=joints, no_collision=pairs,
@@ -454,6 +456,14 @@ def link_rider_errors(swings: Sequence[Swing],
             found.append(errors.DuplicateName(where, name, 'a rider that no other link moves'))
         taken.add(name)
     return found
+
+
+def collider_errors(swings: Sequence[Swing], names: list[str]) -> list[errors.ModelError]:
+    """Errors of colliders on bones that do not exist."""
+    return [errors.UnknownBone(f'swings[{index}].colliders[{number}].bone', collider.bone,
+                               errors.one_of(names, collider.bone))
+            for index, swing in enumerate(swings)
+            for number, collider in enumerate(swing.colliders) if collider.bone not in names]
 
 
 def no_collision_errors(names: list[str],

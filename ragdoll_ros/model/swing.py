@@ -24,6 +24,8 @@ MASS_RANGE = (1e-9, 1e6)
 MAX_STIFFNESS = 1e15
 MAX_DAMPING = 1e4
 MAX_GRAVITY = 10.0
+COLLIDER_RADIUS_RANGE = (1e-3, 1e3)
+"""m; a tip's way in the shortest step is still less than the smallest."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,8 @@ class Link:
     """A massless rod of ``length`` m with a point ``mass`` (kg) at its end.
 
     ``direction`` is its rest direction (doll's frame, bind pose); None: its swing's. ``riders``
-    are the names of those of the doll's riders that it moves, with their skin.
+    are the names of those of the doll's riders that it moves, with their skin. ``radius`` m is that
+    of its mass for colliders.
     """
 
     length: float
@@ -40,16 +43,36 @@ class Link:
     damping: float = 0.0
     direction: Vector | None = None
     riders: tuple[str, ...] = ()
+    radius: float = 0.0
 
     def __post_init__(self) -> None:
         set_fields(self, riders=tuple(self.riders), **{key: float(getattr(self, key))
-                            for key in ('length', 'mass', 'stiffness', 'damping')})
+                            for key in ('length', 'mass', 'stiffness', 'damping', 'radius')})
         errors.check_range('length', self.length, *LENGTH_RANGE)
         errors.check_range('mass', self.mass, *MASS_RANGE)
         errors.check_range('stiffness', self.stiffness, 0, MAX_STIFFNESS)
         errors.check_range('damping', self.damping, 0, MAX_DAMPING)
+        errors.check_range('radius', self.radius, 0, COLLIDER_RADIUS_RANGE[1])
         if self.direction is not None:
             set_fields(self, direction=unit_vector('direction', self.direction))
+
+
+@dataclass(frozen=True)
+class Collider:
+    """A sphere about the point ``at``, m, or a capsule whose axis goes on from there to ``to``:
+    fixed to ``bone``, with a ``radius`` in m. Points are in the doll's frame, bind pose.
+    """
+
+    bone: str
+    radius: float
+    at: Vector
+    to: Vector | None = None
+
+    def __post_init__(self) -> None:
+        set_fields(self, radius=float(self.radius), at=finite_floats('at', self.at))
+        errors.check_range('radius', self.radius, *COLLIDER_RADIUS_RANGE)
+        if self.to is not None:
+            set_fields(self, to=finite_floats('to', self.to))
 
 
 @dataclass(frozen=True)
@@ -59,7 +82,8 @@ class Swing:
     ``mode``: 'spring' (links return to their rest directions), 'pendulum' (no springs), 'free'
     (no rods: each mass falls from its rest position with ``velocity`` m/s, world axes, which only
     this mode has). ``independent``: each link swings as if nothing hung on it, as the spring bones
-    of VRM do; else it carries the masses beyond it.
+    of VRM do; else it carries the masses beyond it. Its masses do not enter ``colliders``: they
+    lose their speed towards them, and slide without friction.
     """
 
     name: str
@@ -71,9 +95,10 @@ class Swing:
     mode: str = 'spring'
     velocity: Vector = (0.0, 0.0, 0.0)
     independent: bool = False
+    colliders: tuple[Collider, ...] = ()
 
     def __post_init__(self) -> None:
-        set_fields(self, root=finite_floats('root', self.root),
+        set_fields(self, root=finite_floats('root', self.root), colliders=tuple(self.colliders),
                    direction=unit_vector('direction', self.direction), links=tuple(self.links),
                    gravity=float(self.gravity), velocity=finite_floats('velocity', self.velocity))
         errors.check_range('gravity', self.gravity, -MAX_GRAVITY, MAX_GRAVITY)
@@ -89,6 +114,9 @@ class Swing:
             raise errors.WrongForm('independent', self.independent, 'true or false')
         if self.mode != 'free' and any(self.velocity):
             raise errors.WrongForm('velocity', self.velocity, 'none, or mode: free')
+        if self.mode == 'free' and self.colliders:
+            raise errors.WrongForm('colliders', f'{len(self.colliders)} of a free swing',
+                                   'none, or another mode')
 
     def directions(self) -> tuple[Vector, ...]:
         """Rest direction of each link (doll's frame, bind pose)."""

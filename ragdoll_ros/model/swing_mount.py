@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,15 @@ from . import rotation
 from .ragdoll import Bone
 from .scene import Scene
 from .swing import Swing
+
+
+@dataclass(frozen=True)
+class MountedCollider:
+    """A collider on the bone of index ``bone``; both ends of its axis (2, 3) m in its frame."""
+
+    bone: int
+    axis: np.ndarray
+    radius: float
 
 
 @dataclass(frozen=True)
@@ -23,6 +32,7 @@ class SwingMount:
     """(3,) m."""
     directions: np.ndarray
     """(links, 3) unit vectors."""
+    colliders: tuple[MountedCollider, ...] = ()
 
     @classmethod
     def on(cls, swing: Swing, bone: Bone, index: int, name: str = '') -> SwingMount:
@@ -51,9 +61,20 @@ def mount_swings(scene: Scene) -> list[SwingMount]:
     for placement in scene.dolls:
         for swing in placement.doll.swings:
             index = scene.bone_index(scene.qualified(placement, swing.bone))
-            found.append(SwingMount.on(swing, placement.doll.bone(swing.bone), index,
-                                       scene.qualified(placement, swing.name)))
+            mount = SwingMount.on(swing, placement.doll.bone(swing.bone), index,
+                                  scene.qualified(placement, swing.name))
+            colliders = tuple(MountedCollider(
+                scene.bone_index(scene.qualified(placement, collider.bone)),
+                placement.doll.bone(collider.bone).pose.apply_inverse(
+                    np.array([collider.at, collider.to or collider.at])), collider.radius)
+                for collider in swing.colliders)
+            found.append(replace(mount, colliders=colliders))
     return found
+
+
+def bones_of(mount: SwingMount) -> list[int]:
+    """Indices of the bones that a swing and its colliders are on."""
+    return [mount.bone, *(collider.bone for collider in mount.colliders)]
 
 
 def each_link(mounted: Sequence[SwingMount]) -> Iterator[tuple[SwingMount, int]]:

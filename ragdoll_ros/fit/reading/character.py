@@ -16,7 +16,14 @@ from .materials import Materials
 from .rigid_meshes import add_rigid_meshes
 from .scale import metres_per_unit
 from .skins import Skins, read_skins
-from .spring_bones import SpringBone, drop_short_segments, read_springs, with_points
+from .spring_bones import (
+    SpringBone,
+    drop_short_segments,
+    node_matrix,
+    read_springs,
+    with_points,
+)
+from .spring_colliders import placed, transformed
 
 MAX_BONES = 1500
 """A detailed face has about 900."""
@@ -161,9 +168,15 @@ def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
         # The last node of VRM 1.0 ends the last segment.
         links = {place[node]: min(number, len(spring.joints) - 1)
                  for number, node in enumerate(spring.nodes) if node in place}
+        colliders = [placed(collider, node_matrix(collider.node, nodes, skins.bind_matrices),
+                            place.get(collider.node, _parent_bone(collider.node, nodes.parents,
+                                                                  place)))
+                     for collider in spring.colliders]
         found.append(drop_short_segments(replace(
             spring, points=spring.points @ matrix.T, carrier=carrier, bones=tuple(links),
-            links=tuple(links.values())), notes))
+            links=tuple(links.values()), colliders=tuple(
+                transformed(collider, matrix) for collider in colliders
+                if collider.bone >= 0)), notes))
     found = [spring for spring in found if spring.joints]
     names = unique_names([spring.name for spring in found], 'bone')
     return tuple(replace(spring, name=name) for spring, name in zip(found, names, strict=True))

@@ -1,8 +1,8 @@
 """Spring bones of a VRM character: hair, tails and skirts.
 
 VRMC_springBone 1.0 and the secondaryAnimation of VRM 0.x. A spring is a chain of nodes; each joint
-governs the segment to the next node. Colliders, hit radii, centers and the horizontal part of
-gravity are ignored.
+governs the segment to the next node. Centers and the horizontal part of gravity are ignored;
+colliders are read by spring_colliders.py.
 """
 from dataclasses import dataclass, replace
 
@@ -12,12 +12,13 @@ from ...files.gltf.gltf_file import GltfFile, get_container, get_objects
 from ...files.gltf.nodes import Nodes
 from ...model import errors
 from ...model.swing import LENGTH_RANGE
+from .spring_colliders import SpringCollider, colliders_of, read_new_colliders, read_old_colliders
 
 TIP_LENGTH = 0.07
 """m; length of the segment beyond the last node in VRM 0.x."""
 
 JOINT_SETTINGS = {'stiffness': (1.0, 0.0, 1e6), 'gravityPower': (0.0, -1e6, 1e6),
-                  'dragForce': (0.5, 0.0, 1.0)}
+                  'dragForce': (0.5, 0.0, 1.0), 'hitRadius': (0.0, 0.0, 1e6)}
 """Default of the specification, minimum, maximum."""
 
 
@@ -31,6 +32,8 @@ class SpringJoint:
     """Units of the file per second, downwards."""
     drag: float
     """Fraction per frame, 0 to 1."""
+    radius: float = 0.0
+    """Of the sphere at its end, for colliders: units of the file."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class SpringBone:
     """The character's bones in the chain."""
     links: tuple[int, ...] = ()
     """The segment that each of these moves with, from 0."""
+    colliders: tuple[SpringCollider, ...] = ()
 
 
 def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[SpringBone]:
@@ -57,14 +61,21 @@ def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[SpringB
     if 'VRMC_springBone' in extensions:
         where = 'extensions.VRMC_springBone'
         data = get_container(extensions, 'VRMC_springBone', dict, 'extensions')
+        groups = read_new_colliders(file, data, where, notes)
         for number, entry in enumerate(get_objects(data, 'springs', where)):
-            found.append(_spring(file, nodes, entry, f'{where}.springs[{number}]'))
+            place = f'{where}.springs[{number}]'
+            found.append(replace(_spring(file, nodes, entry, place),
+                                 colliders=colliders_of(entry, groups, place)))
     else:
         where = 'extensions.VRM.secondaryAnimation'
         data = get_container(get_container(extensions, 'VRM', dict, 'extensions'),
                              'secondaryAnimation', dict, 'extensions.VRM')
+        groups = read_old_colliders(file, data, where)
         for number, entry in enumerate(get_objects(data, 'boneGroups', where)):
-            found += _bone_group(file, nodes, entry, f'{where}.boneGroups[{number}]')
+            place = f'{where}.boneGroups[{number}]'
+            colliders = colliders_of(entry, groups, place)
+            found += [replace(spring, colliders=colliders)
+                      for spring in _bone_group(file, nodes, entry, place)]
         found.sort(key=lambda spring: nodes.order.index(spring.nodes[0]))
     springs, taken = [], set()
     for spring in found:
@@ -85,10 +96,10 @@ def with_points(spring: SpringBone, nodes: Nodes,
     Other nodes keep their transform relative to the nearest such ancestor. Raises NotFinite or
     WrongForm where that is undefined.
     """
-    points = [_node_position(node, nodes, bind_matrices) for node in spring.nodes]
+    points = [node_matrix(node, nodes, bind_matrices)[:3, 3] for node in spring.nodes]
     if len(points) == len(spring.joints):
         above = nodes.parents[spring.nodes[-1]]
-        step = points[-1] - (_node_position(above, nodes, bind_matrices) if above >= 0
+        step = points[-1] - (node_matrix(above, nodes, bind_matrices)[:3, 3] if above >= 0
                              else points[-1])
         length = float(np.linalg.norm(step))
         direction = step / length if length > 0 else (0, -1, 0)
@@ -159,22 +170,22 @@ def _spring_joint(data: dict, where: str) -> SpringJoint:
         raise errors.WrongForm(f'{where}.gravityDir', down, '3 numbers')
     length = float(np.linalg.norm(down)) or 1.0
     return SpringJoint(values['stiffness'], -values['gravityPower'] * down[1] / length,
-                       values['dragForce'])
+                       values['dragForce'], values['hitRadius'])
 
 
-def _node_position(node: int, nodes: Nodes, bind_matrices: dict[int, np.ndarray]) -> np.ndarray:
-    """Position (3,) of a node, fixed to the nearest skin joint at or above it."""
+def node_matrix(node: int, nodes: Nodes, bind_matrices: dict[int, np.ndarray]) -> np.ndarray:
+    """Transform (4, 4) of a node, fixed to the nearest skin joint at or above it."""
     joint_node = node
     while joint_node >= 0 and joint_node not in bind_matrices:
         joint_node = nodes.parents[joint_node]
     if joint_node in (node, -1):
-        return (bind_matrices[node] if joint_node >= 0 else nodes.worlds[node])[:3, 3]
+        return bind_matrices[node] if joint_node >= 0 else nodes.worlds[node]
     try:
         back = np.linalg.inv(nodes.worlds[joint_node])
     except np.linalg.LinAlgError:
         raise errors.WrongForm(f'nodes[{joint_node}]', 'a scale of zero',
                                'nodes that give a spring a length') from None
-    return (bind_matrices[joint_node] @ back @ nodes.worlds[node])[:3, 3]
+    return bind_matrices[joint_node] @ back @ nodes.worlds[node]
 
 
 def _is_descendant(node: int, above: int, nodes: Nodes) -> bool:

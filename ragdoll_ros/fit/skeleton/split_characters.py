@@ -96,7 +96,9 @@ def subset_character(character: Character, own: np.ndarray) -> Character:
     springs = tuple(replace(spring, carrier=int(place[spring.carrier]),
                             bones=tuple(int(place[bone]) for bone in spring.bones if own[bone]),
                             links=tuple(link for bone, link in zip(spring.bones, spring.links,
-                                                                   strict=True) if own[bone]))
+                                                                   strict=True) if own[bone]),
+                            colliders=tuple(replace(each, bone=int(place[each.bone]))
+                                            for each in spring.colliders if own[each.bone]))
                     for spring in character.springs if own[spring.carrier])
     return replace(
         character, bone_names=tuple(character.bone_names[bone] for bone in chosen),
@@ -119,5 +121,6 @@ def to_frame(character: Character, frame: Pose) -> Character:
         character, positions=frame.apply_inverse(character.positions),
         orientations=rotation.multiply(back, character.orientations),
         vertices=frame.apply_inverse(character.vertices), appearance=appearance,
-        springs=tuple(replace(spring, points=frame.apply_inverse(spring.points))
-                      for spring in character.springs))
+        springs=tuple(replace(spring, points=frame.apply_inverse(spring.points), colliders=tuple(
+            replace(each, axis=frame.apply_inverse(each.axis)) for each in spring.colliders))
+            for spring in character.springs))

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.swing_mount import SwingMount
 from ..kernels.compiling.decorators import rows_of
-from ..kernels.swing.links import LINK
+from ..kernels.swing.links import COLLIDER, LINK
 from ..kernels.swing.loaded import chain_modes
 
 
@@ -28,10 +28,24 @@ def make_links(mounted: Sequence[SwingMount], gravity: np.ndarray) -> np.ndarray
         own['bone'], own['root'], own['rest'] = mount.bone, mount.root, mount.directions
         own['parent'] = np.arange(first - 1, last - 1)
         own['parent'][0] = -1
+        own['radius'] = [link.radius for link in swing.links]
         own['length'], own['reach'], own['stiffness'] = lengths, inertia / lever, springs / inertia
         own['damping'] = 2 * ratios * np.sqrt((springs + weight * lever) / inertia)
         own['gravity'] = np.outer(lever / inertia, swing.gravity * gravity)
     return links
+
+
+def make_colliders(mounted: Sequence[SwingMount]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Records COLLIDER of all colliders of mounted swings, and the first of each swing and the one
+    after its last, (c,).
+    """
+    found = [collider for mount in mounted for collider in mount.colliders]
+    rows = rows_of(COLLIDER, len(found))
+    for row, collider in zip(rows, found, strict=True):
+        row['bone'], row['radius'] = collider.bone, collider.radius
+        row['start'], row['end'] = collider.axis
+    ends = np.cumsum([len(mount.colliders) for mount in mounted], dtype=np.int64)
+    return rows, np.append(0, ends)[:-1].astype(np.int64), ends
 
 
 def carried(lengths: np.ndarray, masses: np.ndarray, springs: np.ndarray,

@@ -22,11 +22,11 @@ from ...model import rotation
 from ...model.scene import SECOND, Scene
 from ...model.scene_change import SceneChange
 from ...model.state import State
-from ...model.swing_mount import SwingMount, mount_swings
+from ...model.swing_mount import SwingMount, bones_of, mount_swings
 from ..kernels.compiling.decorators import rows_of
 from ..kernels.swing.links import LINK_STATE, RESPONSE, Chains
 from ..kernels.swing.loaded import advance_chains
-from .chains import make_links
+from .chains import make_colliders, make_links
 from .pose import FreeMasses, MassIndex, SwingState
 from .track import Track
 
@@ -51,13 +51,14 @@ class Swings:
         gravity = np.array(gravity, float)
         self._free = _FreeFall([mount for mount in mounted if mount.swing.mode == 'free'], gravity)
         self._mass_index = MassIndex.of(mounted)
-        bones = max((mount.bone for mount in mounted), default=-1) + 1
+        bones = max((bone for mount in mounted for bone in bones_of(mount)), default=-1) + 1
         chains = [mount for mount in mounted if mount.swing.mode != 'free']
         links = make_links(chains, gravity)
         self.step = step or _grid(links)
         ends = np.cumsum([len(mount.swing.links) for mount in chains], dtype=np.int64)
         self._chains = Chains(links, np.append(0, ends)[:-1], ends, rows_of(RESPONSE, len(links)),
-                              rows_of(RESPONSE, len(links)), np.zeros((bones, 13)))
+                              rows_of(RESPONSE, len(links)), np.zeros((bones, 13)),
+                              *make_colliders(chains), rows_of(LINK_STATE, len(links)))
         advance_chains.set_responses(links, self.step, self._chains.responses)
         self._states = rows_of(LINK_STATE, len(links))
         self._begin: float | None = None
@@ -204,15 +205,22 @@ class SwingSimulation:
 
     def __init__(self, scene: Scene) -> None:
         mounted = mount_swings(scene)
-        self._bones = np.unique([mount.bone for mount in mounted])
-        mounted = [dataclasses.replace(mount, bone=int(np.searchsorted(self._bones, mount.bone)))
-                   for mount in mounted]
+        self._bones = np.unique([bone for mount in mounted for bone in bones_of(mount)])
+        mounted = [self._on_own_bones(mount) for mount in mounted]
         self._track = Track()
         self._swings = Swings(mounted, scene.gravity, self._track)
         self.names = self._swings.names
         """Names of the masses, in the order of the state's arrays."""
         self.state: SwingState | None = None
         """State of all masses at the last tick; None before reset()."""
+
+    def _on_own_bones(self, mount: SwingMount) -> SwingMount:
+        """The mount with indices among the bones that carry swings or colliders."""
+        def own(bone: int) -> int:
+            return int(np.searchsorted(self._bones, bone))
+        colliders = tuple(dataclasses.replace(collider, bone=own(collider.bone))
+                          for collider in mount.colliders)
+        return dataclasses.replace(mount, bone=own(mount.bone), colliders=colliders)
 
     def reset(self, time: int, state: State) -> None:
         """Start at rest at ``time`` ns."""

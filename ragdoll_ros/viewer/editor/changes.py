@@ -205,7 +205,9 @@ def remove_limb(scene: Scene, name: str) -> Scene:
         scene, placement,
         bones=tuple(bone for bone in doll.bones if bone.name not in removed),
         joints=tuple(joint for joint in doll.joints if joint.child not in removed),
-        swings=tuple(swing for swing in doll.swings if swing.bone not in removed),
+        swings=tuple(dataclasses.replace(swing, colliders=tuple(
+            collider for collider in swing.colliders if collider.bone not in removed))
+            for swing in doll.swings if swing.bone not in removed),
         riders=tuple(reattached(rider, doll.bone(rider.bone), doll.bone(joint.parent))
                      if rider.bone in removed else rider for rider in doll.riders),
         no_collision=tuple(pair for pair in doll.no_collision if removed.isdisjoint(pair)))
@@ -278,7 +280,13 @@ def _move_limb(scene: Scene, placement: Placement, bone: Bone, moved: Bone) -> S
     joints = tuple(dataclasses.replace(
         joint, anchor=point(joint.anchor), axes=tuple(direction(axis) for axis in joint.axes))
         if joint.child in names else joint for joint in doll.joints)
-    swings = tuple(move_swing(swing) if swing.bone in names else swing for swing in doll.swings)
+    def move_colliders(swing: Swing) -> Swing:
+        return dataclasses.replace(swing, colliders=tuple(dataclasses.replace(
+            each, at=point(each.at), to=each.to and point(each.to))
+            if each.bone in names else each for each in swing.colliders))
+
+    swings = tuple(move_colliders(move_swing(swing) if swing.bone in names else swing)
+                   for swing in doll.swings)
     return replace_doll(scene, placement, bones=_replaced(bones, bones[doll.bones.index(bone)],
                                                          moved), joints=joints, swings=swings)
 

@@ -12,40 +12,27 @@ import numpy as np
 
 from ..compiling.decorators import compiled, entry, inlined, type_like
 from ..maths.vectors import Vec3, dot, put, vec
-from .bone_path import interpolate_state
+from .bone_path import set_bones
+from .collide import advance_among
+from .colliders import move_out
 from .link_step import (limited, outward, place, root_forces, root_frame, set_response, step_link,
                         tip_frame)
-from .links import LINK, LINK_STATE, RESPONSE, Chains, Frame
+from .links import COLLIDER, LINK, LINK_STATE, RESPONSE, Around, Chains, Frame
 
 MAX_SUBSTEPS = 64
 
 CHAINS = type_like(Chains(
     np.zeros(0, LINK), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, RESPONSE),
-    np.zeros(0, RESPONSE), np.zeros((0, 13))))
+    np.zeros(0, RESPONSE), np.zeros((0, 13)), np.zeros(0, COLLIDER), np.zeros(0, np.int64),
+    np.zeros(0, np.int64), np.zeros(0, LINK_STATE)))
 LINKS, STATES, RESPONSES = (type_like(np.zeros(0, kind)) for kind in (LINK, LINK_STATE, RESPONSE))
 KNOTS, BONES, ROWS = (type_like(np.zeros((0,) * dimensions)) for dimensions in (1, 2, 3))
 NUMBER, INDEX, FLAG = (type_like(value) for value in (0.0, 0, False))
 
 
 @compiled
-def set_bones(time: float, knots: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-    """See bones_at()."""
-    after = np.searchsorted(knots, time)
-    if after == len(knots) or knots[after] == time or after == 0:
-        known = min(after, len(knots) - 1)
-        for bone in range(len(out)):
-            for k in range(13):
-                out[bone, k] = rows[known, bone, k]
-        return
-    span = knots[after] - knots[after - 1]
-    part = (time - knots[after - 1]) / span
-    for bone in range(len(out)):
-        interpolate_state(rows[after - 1, bone], rows[after, bone], span, part, out[bone])
-
-
-@compiled
 def bone_at(time: float, knots: np.ndarray, rows: np.ndarray, bone: int) -> np.ndarray:
-    """State (13,) of one bone; see bones_at()."""
+    """State (13,) of one bone; see set_bones()."""
     out = np.empty((1, 13))
     set_bones(time, knots, rows[:, bone:bone + 1], out)
     return out[0]
@@ -96,9 +83,7 @@ def set_responses(links: np.ndarray, h: float, responses: np.ndarray) -> None:
 
 @entry(NUMBER, KNOTS, ROWS, BONES)
 def bones_at(time: float, knots: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-    """Write the states (b, 13) of bones at ``time`` s, which are known as ``rows`` (k, b, 13) at
-    ``knots`` (k,) s; constant before the first and after the last.
-    """
+    """Write the states (b, 13) of bones at ``time`` s; see set_bones()."""
     set_bones(time, knots, rows, out)
 
 
@@ -106,12 +91,15 @@ def bones_at(time: float, knots: np.ndarray, rows: np.ndarray, out: np.ndarray) 
 def begin_chains(chains: Chains, states: np.ndarray, bones: np.ndarray, has_directions: bool,
                  has_rates: bool) -> None:
     """Start links (m,) on bones (b, 13), in the directions and with the rates that ``states`` has
-    of them; else in their rest directions, and at rest relative to their frames.
+    of them; else in their rest directions, and at rest relative to their frames. Tips that are
+    inside colliders are moved out.
     """
     matrix = np.empty((3, 3))
+    chain = -1
     for k in range(len(states)):
         link, state = chains.links[k], states[k]
         if link.parent < 0:
+            chain += 1
             frame = root_frame(link, bones[link.bone], matrix)
         else:
             frame = tip_frame(chains.links[link.parent], states[link.parent], math.inf)
@@ -119,6 +107,9 @@ def begin_chains(chains: Chains, states: np.ndarray, bones: np.ndarray, has_dire
         place(link, state, frame, d)
         if not has_rates:
             put(state.rate, vec(state.drift))
+        if chains.firsts[chain] < chains.lasts[chain]:
+            move_out(link, state, frame, Around(chains.colliders, chains.firsts[chain],
+                                                chains.lasts[chain], bones, bones, True))
 
 
 @entry(CHAINS, STATES, KNOTS, ROWS, NUMBER, INDEX, INDEX, NUMBER)
@@ -131,6 +122,7 @@ def advance_chains(chains: Chains, states: np.ndarray, knots: np.ndarray, rows: 
     # Locals, as each array that is taken from a tuple is counted.
     links, starts, ends, roots = chains.links, chains.starts, chains.ends, chains.roots
     responses, part_responses = chains.responses, chains.part_responses
+    firsts, lasts = chains.firsts, chains.lasts
     most = math.pi / responses[0].h
     if h != responses[0].h:
         responses = part_responses
@@ -140,6 +132,9 @@ def advance_chains(chains: Chains, states: np.ndarray, knots: np.ndarray, rows: 
         set_bones(origin + (index + 1) * h, knots, rows, roots)
         for chain in range(len(starts)):
             start, stop = starts[chain], ends[chain]
+            if firsts[chain] < lasts[chain]:
+                advance_among(chains, states, chain, origin + index * h, h, knots, rows)
+                continue
             link = links[start]
             frame = root_frame(link, roots[link.bone], matrix)
             forces = root_forces(link, responses[start], states[start], frame)

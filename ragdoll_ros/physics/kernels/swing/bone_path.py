@@ -18,6 +18,24 @@ from ..maths.vectors import (Quat, Vec3, add, add_scaled, cross, divide, dot, no
 
 
 @compiled
+def set_bones(time: float, knots: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+    """Write the states (b, 13) at ``time`` s of bones with states ``rows`` (k, b, 13) at ``knots``
+    (k,) s; constant before the first and after the last.
+    """
+    after = np.searchsorted(knots, time)
+    if after == len(knots) or knots[after] == time or after == 0:
+        known = min(after, len(knots) - 1)
+        for bone in range(len(out)):
+            for k in range(13):
+                out[bone, k] = rows[known, bone, k]
+        return
+    span = knots[after] - knots[after - 1]
+    part = (time - knots[after - 1]) / span
+    for bone in range(len(out)):
+        interpolate_state(rows[after - 1, bone], rows[after, bone], span, part, out[bone])
+
+
+@compiled
 def interpolate_state(start: np.ndarray, end: np.ndarray, span: float, part: float,
             out: np.ndarray) -> None:
     """Write to ``out`` (13,) the state at fraction ``part`` (0 to 1) of the path of ``span`` s

@@ -17,12 +17,17 @@ import numpy as np
 LINK = np.dtype([
     ('bone', np.int64), ('parent', np.int64), ('root', float, 3), ('rest', float, 3),
     ('length', float), ('reach', float), ('stiffness', float), ('damping', float),
-    ('gravity', float, 3)], align=True)
+    ('gravity', float, 3), ('radius', float)], align=True)
 """Constants of a link. bone: its row among the bones that carry swings. parent: the link that it
 hangs on, always the one before it, or -1 for the first of a chain. root: attachment of the first
 link in its bone's frame, m. rest: unit rest direction in the frame at its root. length, m; reach:
 length of the simple pendulum of the same period, m. stiffness w, 1/s^2; damping c, 1/s. gravity,
-1/s^2: the scene's, times the swing's share, over reach."""
+1/s^2: the scene's, times the swing's share, over reach. radius, m: of its mass, for colliders."""
+
+COLLIDER = np.dtype([('bone', np.int64), ('start', float, 3), ('end', float, 3), ('radius', float)],
+                    align=True)
+"""A capsule on a bone: its row among the bones that carry swings or colliders, and the ends of its
+axis in its frame, m; equal for a sphere. radius, m."""
 
 LINK_STATE = np.dtype([
     ('point', float, 3), ('velocity', float, 3), ('axes', float, (3, 3)), ('spin', float, 3),
@@ -43,11 +48,18 @@ y'(0) = drift, y(h) = the turn of a direction that is fixed in the frame. root_m
 root_speed, 1/(m s): of the inertial force of its root's motion. largest_square, 1/s^4: of a force
 under which the step is not divided."""
 
-Chains = collections.namedtuple('Chains', 'links starts ends responses part_responses roots')
+Chains = collections.namedtuple(
+    'Chains', 'links starts ends responses part_responses roots colliders firsts lasts before')
 """The m links of c chains. ``links`` (m,) LINK, in the scene's order; ``starts`` (c,) and ``ends``
 (c,): first link of each chain, and the one after its last. ``responses`` (m,) to a step of the
 grid. Scratch: ``part_responses`` (m,) to other steps; ``roots`` (b, 13) states of the bones that
-carry swings."""
+carry swings or colliders. ``colliders`` COLLIDER, chain by chain, of each from ``firsts`` (c,) to
+``lasts`` (c,), as starts and ends; scratch for them: ``before`` (m,) LINK_STATE."""
+
+Around = collections.namedtuple('Around', 'colliders first until before after holds_all')
+"""What is around a chain in a step: ``colliders`` COLLIDER, its own from ``first`` to ``until``;
+states (b, 13) of the bones ``before`` and ``after`` the step; whether all colliders hold tips
+outside (``holds_all``), or those that they touch."""
 
 Frame = collections.namedtuple('Frame', 'point velocity x y z spin')
 """A frame, world: its origin, m, and velocity, m/s; its axes; its angular velocity, rad/s."""
