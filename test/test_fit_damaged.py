@@ -108,3 +108,29 @@ def test_two_hundred_of_them_in_little_memory(tmp_path, whole):
     assert codes.count(2) > 100
     assert sum(line.startswith('ragdoll_fit: ') for line in said) == codes.count(2)
     assert peak - least < MOST_MORE
+
+
+@pytest.mark.parametrize('bad', [np.nan, np.inf, -np.inf])
+def test_weights_that_are_no_numbers_are_taken_as_zero_and_counted(tmp_path, capsys, bad):
+    """Of every tenth vertex the first weight: the doll is that of a file with zeros there."""
+    from ragdoll_ros.fit.reading.character import read_character
+    read = []
+    for name, value in (('zero', 0.0), ('bad', bad)):
+        made = document(RIGS['mixamo'])
+        primitive = made.data['meshes'][0]['primitives'][0]
+        accessor = made.data['accessors'][primitive['attributes']['WEIGHTS_0']]
+        view = made.data['bufferViews'][accessor['bufferView']]
+        start = view.get('byteOffset', 0) + accessor.get('byteOffset', 0)
+        blob = bytearray(made.blob)
+        weights = np.frombuffer(blob, '<f4', 4 * accessor['count'], start).reshape(-1, 4)
+        weights[::10, 0] = value
+        made.blob = bytes(blob)
+        (tmp_path / f'{name}.glb').write_bytes(made.glb())
+        read.append(read_character(tmp_path / f'{name}.glb'))
+        assert main([str(tmp_path / f'{name}.glb')]) == 0
+    zero, repaired = read
+    assert np.array_equal(zero.weights, repaired.weights)
+    assert np.array_equal(zero.vertices, repaired.vertices)
+    count = len(zero.vertices)
+    assert (f'weights of {-(-count // 10)} of {count} vertices are no numbers: taken as 0'
+            in capsys.readouterr().out)

@@ -23,7 +23,8 @@ example:
   ragdoll_fit character.glb -o doll.yaml --picture doll.png
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=doll.yaml
 
-A .urdf becomes a doll too: a robot without motor torques. A .yaml with a doll or a scene is
+A .urdf becomes a doll too: a robot without motor torques; so does a .xacro, where xacro is
+installed. A .yaml with a doll or a scene is
 checked and reported.
 If the file has several characters, each becomes a doll: DOLL.yaml is a scene with all of them in
 place; DOLL.urdf and OUT.png get _1, _2, ... before the suffix.
@@ -32,7 +33,7 @@ Exit code 0: success; 2: invalid file or option; 3: --strict, and the doll is no
 
 PICTURE_SUFFIXES = ('.png', '.jpg', '.svg', '.pdf')
 
-DOLL_SUFFIXES, ROBOT_SUFFIXES = ('.yaml', '.yml'), ('.urdf', '.xml')
+DOLL_SUFFIXES, ROBOT_SUFFIXES = ('.yaml', '.yml'), ('.urdf', '.xml', '.xacro')
 """Files that define bodies; for all other files, characters, bodies are fitted."""
 
 FIT_ARGUMENTS = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest', 'keep',

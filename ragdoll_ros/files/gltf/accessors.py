@@ -17,16 +17,19 @@ COMPONENT_COUNTS = {'SCALAR': 1, 'VEC2': 2, 'VEC3': 3, 'VEC4': 4, 'MAT4': 16}
 
 
 def read_floats(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
-    """Values (count, width) float64 of an accessor whose type is ``kind`` ('VEC3', ...).
-
-    Raises NotFinite for a value that is not finite, another ModelError for a broken accessor;
-    ``where`` is the field that refers to it.
-    """
-    values = _read(file, index, kind, where)
+    """As read_numbers(). Raises NotFinite for a value that is not finite."""
+    values = read_numbers(file, index, kind, where)
     if not np.isfinite(values).all():
         bad = values[~np.isfinite(values)][0]
         raise errors.NotFinite(where, float(bad), 'finite numbers')
-    return values.astype(float)
+    return values
+
+
+def read_numbers(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
+    """Values (count, width) float64 of an accessor whose type is ``kind`` ('VEC3', ...), finite or
+    not. Raises a ModelError for a broken accessor; ``where`` is the field that refers to it.
+    """
+    return _read(file, index, kind, where).astype(float)
 
 
 def read_indices(file: GltfFile, index: object, kind: str, limit: int, where: str) -> np.ndarray:

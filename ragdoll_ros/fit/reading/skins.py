@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...files.gltf.accessors import read_floats, read_indices
+from ...files.gltf.accessors import read_floats, read_indices, read_numbers
 from ...files.gltf.bind_poses import add_bind_matrices, read_skin
 from ...files.gltf.gltf_file import GltfFile, get_container, get_count, get_objects
 from ...files.gltf.nodes import Nodes
@@ -109,14 +109,18 @@ def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.nda
         label = f'{where}.JOINTS_{number}'
         slots.append(read_indices(file, attributes[f'JOINTS_{number}'], 'VEC4', 1 << 16, label))
         label = f'{where}.WEIGHTS_{number}'
-        weights.append(read_floats(file, attributes.get(f'WEIGHTS_{number}'), 'VEC4', label))
+        weights.append(read_numbers(file, attributes.get(f'WEIGHTS_{number}'), 'VEC4', label))
     if not slots:
         skins.notes.append(f'{where} has no JOINTS_0: ignored')
         return
     if any(len(part) != len(points) for part in (*slots, *weights)):
         raise errors.WrongForm(where, 'attributes of different length', f'{len(points)} of each')
     slot, weight = np.concatenate(slots, axis=1), np.concatenate(weights, axis=1)
-    weight = np.maximum(weight, 0)
+    bad = ~np.isfinite(weight)
+    if count := int(bad.any(axis=1).sum()):
+        skins.notes.append(f'{where}: weights of {count} of {len(points)} vertices are no numbers: '
+                           'taken as 0')
+    weight = np.where(bad, 0, np.maximum(weight, 0))
     # Joint indices with zero weight may be invalid.
     used = np.where(weight > 0, slot, 0)
     if (used >= len(joints)).any():

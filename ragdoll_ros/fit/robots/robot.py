@@ -22,6 +22,7 @@ from ...model import errors, rotation
 from ...model.pose import Pose
 from ...model.ragdoll import MAX_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
 from .link_bodies import LinkMeshes, link_shapes, make_bone
+from .xacro_text import expand_xacro
 
 ROTATING_KINDS = ('revolute', 'continuous', 'floating', 'spherical')
 """URDF joint kinds that become a joint with angles."""
@@ -43,13 +44,15 @@ def doll_from_urdf(text: str) -> Ragdoll:
 
 
 def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
-    """Doll of a URDF file, and notes on what could not be imported.
+    """Doll of a URDF or xacro file, and notes on what could not be imported.
 
     As doll_from_urdf; raises ModelErrors with the faults, OSError where it cannot be read.
     """
     path = Path(path)
     try:
-        doll, notes = _doll(parse_urdf(read_xml(path, 'robot')), path.parent)
+        is_xacro = path.suffix.lower() == '.xacro'
+        text = expand_xacro(path) if is_xacro else read_xml(path, 'robot')
+        doll, notes = _doll(parse_urdf(text), path.parent)
         return doll, tuple(notes)
     except errors.ModelError as error:
         raise errors.ModelErrors(str(path), [error]) from None
