@@ -34,7 +34,7 @@ SCENES = {'drop': (0.42, 0.7, 1), 'man_faints': (0.75, 0.7, 1), 'woman_faints': 
           'crowd': (0.9, 0.6, 1), 'pile': (0.6, 0.6, 16), 'field': (0.4, 0.3, 1000),
           'stairs': (1.1, 0.8, 1), 'table': (0.6, 0.8, 1), 'bathroom': (0.8, 0.9, 1),
           'chair': (0.5, 0.8, 1), 'slope': (1.0, 0.9, 1), 'rubble': (0.5, 0.8, 1),
-          'terrain': (0.7, 0.8, 1), 'robot': (0.5, 0.9, 1)}
+          'terrain': (0.7, 0.8, 1), 'robot': (0.5, 0.9, 1), 'door': (0.55, 0.8, 1)}
 """Instant of the picture, s; distance of the camera, relative to the home view; and how many
 processors can share a tick: its separate clusters."""
 
