@@ -5,7 +5,8 @@ texture coordinates. Invalid parts are ignored: no character is refused for its 
 """
 import math
 
-from ...files.gltf.gltf_file import GltfFile, decode_data_uri, get_count, resolve_uri
+from ...files.gltf.gltf_file import GltfFile
+from ...files.gltf.images import media_type, read_image
 from ...model import errors
 from ...model.skeleton import Texture
 
@@ -20,8 +21,8 @@ NUMERIC_KEYS = {'baseColorFactor': 4, 'metallicFactor': 1, 'roughnessFactor': 1,
 TEXTURES = ('baseColorTexture', 'metallicRoughnessTexture', 'normalTexture', 'occlusionTexture',
             'emissiveTexture')
 
-MAGIC_NUMBERS = {b'\x89PNG': 'image/png', b'\xff\xd8\xff': 'image/jpeg', b'RIFF': 'image/webp'}
-"""First bytes of image files, and their media types."""
+MEDIA_TYPES = ('image/png', 'image/jpeg', 'image/webp')
+"""That browsers show."""
 
 
 class Materials:
@@ -94,23 +95,10 @@ class Materials:
 
     def _read(self, given: dict) -> Texture:
         image = self._entry('images', given.get('source'))
-        uri, view = image.get('uri'), image.get('bufferView')
-        if view is not None:
-            entry = self._file.entry('bufferViews', view, 'images')
-            size = get_count(entry, 'byteLength', f'bufferViews[{view}]')
-            content = self._file.read(view, 0, min(size, MAX_IMAGE_BYTES), 'images')
-        elif isinstance(uri, str) and uri.startswith('data:'):
-            buffer = decode_data_uri(uri, 'images')
-            content = buffer.read(0, buffer.size, 'images')
-        elif isinstance(uri, str):
-            path = resolve_uri(self._file.path.parent, uri, 'images')
-            content = path.read_bytes() if path.stat().st_size <= MAX_IMAGE_BYTES else b''
-        else:
-            raise errors.WrongForm('images', uri, 'a uri or a bufferView')
-        kind = next((kind for magic, kind in MAGIC_NUMBERS.items()
-                     if content.startswith(magic)), None)
+        content = read_image(self._file, image, 'images', MAX_IMAGE_BYTES)
+        kind = media_type(content)
         self._bytes += len(content)
-        if kind is None or self._bytes > MAX_IMAGE_BYTES:
+        if kind not in MEDIA_TYPES or self._bytes > MAX_IMAGE_BYTES:
             raise errors.WrongForm('images', f'{len(content)} bytes',
                                    f'PNG, JPEG or WebP, at most {MAX_IMAGE_BYTES} bytes in total')
         return Texture(content, kind, self._sampler(given.get('sampler')))
