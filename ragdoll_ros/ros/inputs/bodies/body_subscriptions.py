@@ -139,10 +139,10 @@ class BodySubscriptions:
         """Set targets of a doll's motors; a joint that turns without end goes the shorter way.
         Raises UnknownJoint: none of these is the doll's.
         """
-        told = {**angles, **rates}
-        if told and not told.keys() & known.keys():
-            raise errors.UnknownJoint('name', next(iter(told)),
-                                      errors.one_of(list(known), next(iter(told))))
+        named = {**angles, **rates}
+        if named and not named.keys() & known.keys():
+            raise errors.UnknownJoint('name', next(iter(named)),
+                                      errors.one_of(list(known), next(iter(named))))
         scene = self.simulation.scene
         placement, = (each for each in scene.dolls if each.name == name)
         present = dict(zip(scene.angle_names, self.simulation.joint_angles.tolist(), strict=True))
