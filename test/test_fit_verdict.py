@@ -6,6 +6,7 @@ import fit_rigs
 import numpy as np
 import pytest
 from fit_rigs import RIGS, fitted
+from test_fit_many import hairy
 
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.fit.judging.drop_test import run_drop_test
@@ -173,6 +174,15 @@ def test_the_mannequin_is_good(tmp_path):
     path.write_bytes(fit_rigs.mannequin().glb())
     fit = fit_character(read_character(path))
     assert str(judge(fit.doll, fit)) == 'verdict: good'
+
+
+def test_hair_is_no_uncovered_skin_of_the_head(tmp_path):
+    """Swings move it: a person with long hair is as good as one without."""
+    for strands in (1, 40):
+        fit = fit_character(read_character(
+            fit_rigs.write(hairy('hair', strands=strands, radius=.03), tmp_path)))
+        assert fit.doll.swings
+        assert str(judge(fit.doll, fit, falls=False)) == 'verdict: good'
 
 
 def test_the_shipped_doll_has_the_articles_masses_and_no_other_fault():

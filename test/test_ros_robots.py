@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from geometry_msgs.msg import Twist, Vector3
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from test_robot_motion import PLANAR, tip, yaw
@@ -15,6 +16,7 @@ from test_ros_set_state import odometry
 from ragdoll_ros import Simulation, load_scene
 from ragdoll_ros.fit.command import main as fit_main
 from ragdoll_ros.physics.logged_simulation import apply_event, state_digest
+from ragdoll_ros.ros.node import RagdollNode
 
 SCENE = """ground: {}
 dolls: [{doll: doll, position: [0, 0, 0.05]}]
@@ -246,6 +248,49 @@ def test_joint_states_move_an_arm_that_gives_way(make_node, peer, tmp_path):
         while again.time < node.simulation.time:
             again.advance()
         assert state_digest(again.state) == state_digest(node.simulation.state)
+
+
+ALONE = """gravity: [0, 0, -9.8]
+dolls:
+  - {doll: arm.yaml, name: arm, fixed_root: true, orientation: [0.7071068, 0, 0, 0.7071068],
+     motors: {frequency: 1, max_torque: 3}}
+"""
+
+
+def test_an_arm_on_the_topic_of_joint_states_does_not_follow_itself(ros, peer, tmp_path, capfd):
+    """Remapped to /joint_states, where the node's own would be: of a scene of one doll they have
+    the arm's names. The node says so, and which joints a wrong message should have named.
+    """
+    (tmp_path / 'r.urdf').write_text(PLANAR.replace('<link name="foot"/>', FOOT))
+    assert fit_main([str(tmp_path / 'r.urdf'), '-o', str(tmp_path / 'arm.yaml')]) == 0
+    (tmp_path / 'alone.yaml').write_text(ALONE)
+    node = RagdollNode(
+        cli_args=['--ros-args', '-r', '~/bodies/arm/joint_states:=/joint_states'],
+        parameter_overrides=[Parameter('scene', value=str(tmp_path / 'alone.yaml')),
+                             Parameter('start_paused', value=True)])
+    try:
+        said = capfd.readouterr().err
+        assert 'arm moved by /joint_states,' in said
+        assert 'joint_states are not published, as /joint_states moves arm' in said
+        peer.executor_.add_node(node)
+        heard = peer.collect(JointState, '/joint_states')
+        states = peer.sender(JointState, '/joint_states')
+        states.publish(joints(position=(-0.4, 0.3)))
+
+        def targets():
+            return {each.angle: each.target for each in node.simulation.holds}
+
+        peer.wait(lambda: targets() == pytest.approx({'shoulder': -0.4, 'elbow': 0.3}))
+        for _ in range(20):
+            node.tick()
+        states.publish(joints(('x', 'y'), (1, 2)))
+        peer.wait(lambda: node.input_counts.refused)
+        peer.wait(lambda: len(heard) > 1)
+        assert {tuple(message.name) for _, message in heard} == {('shoulder', 'elbow'), ('x', 'y')}
+        assert targets() == pytest.approx({'shoulder': -0.4, 'elbow': 0.3})
+        assert node.input_counts.last_reason.endswith("'x'; expected one of shoulder, elbow")
+    finally:
+        node.destroy_node()
 
 
 FOOT = """<link name="foot"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>

@@ -1,7 +1,8 @@
 """The node's log lines at start and end."""
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rclpy.node import Node
@@ -17,16 +18,16 @@ MOST_DRIVEN = 3
 
 
 def start_line(simulation: Simulation, settings: NodeSettings, node: Node,
-               body_topics: Callable[[str], list[str]]) -> str:
+               moved_by: Mapping[str, Sequence[str]]) -> str:
     """Scene, engine, with the reason if it is not the requested one, accuracy and topics;
-    ``body_topics(name)``: those that move a body.
+    ``moved_by``: those that move bodies and robots, by their names.
     """
     scene, reason = simulation.scene, simulation.engine_reason
     dolls = [placement.doll for placement in scene.dolls if placement.follow is None]
-    driven = ''.join(f', {name} moved by {" and ".join(body_topics(name))}'
-                     for name in scene.driven_names[:MOST_DRIVEN])
-    if len(scene.driven_names) > MOST_DRIVEN:
-        driven += f', and {len(scene.driven_names) - MOST_DRIVEN} more'
+    driven = ''.join(f', {name} moved by {" and ".join(topics)}'
+                     for name, topics in itertools.islice(moved_by.items(), MOST_DRIVEN))
+    if len(moved_by) > MOST_DRIVEN:
+        driven += f', and {len(moved_by) - MOST_DRIVEN} more'
     return (f'scene {scene.name}: {counted(len(dolls), "doll")} of '
             f'{counted(sum(len(doll.bones) for doll in dolls), "bone")}{driven}, '
             f'engine {simulation.engine_name}'

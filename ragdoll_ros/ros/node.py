@@ -341,6 +341,7 @@ class RagdollNode(Node):
         for inputs in (self.inputs, self.states, self.motors):
             inputs.simulation = simulation
         self.bodies.set_simulation(simulation, self.settings)
+        self._outputs.keep_joints_from(self.bodies.moved_by)
         self._diagnostics.simulation = simulation
         self.inputs.settings = self.states.settings = self.settings
         self.recovery.set_simulation(simulation)
@@ -352,7 +353,7 @@ class RagdollNode(Node):
 
     def _log_start(self) -> None:
         self.get_logger().info(start_line(self.simulation, self.settings, self,
-                                          self.bodies.topics))
+                                          self.bodies.moved_by))
         if (overlaps := overlaps_text(self.simulation)) not in ('none', 'unknown'):
             self.get_logger().warning(f'overlaps at the start: {overlaps}')
 

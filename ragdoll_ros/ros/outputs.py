@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -53,6 +53,8 @@ class Outputs:
         self._poses = LatchedTopic(node, PoseArray, '~/poses')
         self._state = overridable_publisher(node, MultiDOFJointState, '~/state', 10)
         self._joints = overridable_publisher(node, JointState, 'joint_states', 10)
+        self._joints_move = ''
+        """What joint_states would move, as they are on the topic that does."""
         self._measures = LatchedTopic(node, DiagnosticArray, '~/measures')
         self._run: tuple[Simulation | None, int, int] = (None, 0, 0)
         """The simulation that was published last, its reset_count, and the number of that run."""
@@ -92,6 +94,19 @@ class Outputs:
         self._urdf = prepared.checksum
         self._description.publish(String(data=prepared.description))
 
+    def keep_joints_from(self, moved_by: Mapping[str, Sequence[str]]) -> None:
+        """Publish no joint_states on a topic that moves a robot: it would follow itself.
+
+        ``moved_by``: topics by the names of what they move.
+        """
+        topic, before = self._joints.topic_name, self._joints_move
+        self._joints_move = ' and '.join(
+            name for name, topics in moved_by.items() if topic in topics)
+        if self._joints_move not in ('', before):
+            self._node.get_logger().warning(
+                f'joint_states are not published, as {topic} moves {self._joints_move}: give them '
+                f'another name, as by -r joint_states:={self._node.get_name()}/joint_states')
+
     def unload(self) -> None:
         """End what is shown: late subscribers get no state and an empty URDF, and all markers are
         deleted.
@@ -110,8 +125,13 @@ class Outputs:
                 or self.humans.has_subscribers
                 or any(topic is not None and topic.has_subscribers
                        for topic in (self._measures, self._poses, self._swings))
-                or any(topic.get_subscription_count()
-                       for topic in (self._state, self._joints, self._contacts, self._wrenches)))
+                or self._joints_wanted or any(
+                    topic.get_subscription_count()
+                    for topic in (self._state, self._contacts, self._wrenches)))
+
+    @property
+    def _joints_wanted(self) -> bool:
+        return not self._joints_move and self._joints.get_subscription_count() > 0
 
     def publish(self, simulation: Simulation, stamp: int, now: int, paused: bool = False) -> None:
         """Publish the simulation's state with ``stamp``, ns, on topics with subscribers, markers at
@@ -128,7 +148,7 @@ class Outputs:
         if self._state.get_subscription_count():
             state = simulation.state
             self._state.publish(templates.state.serialize(stamp, poses_of(state), twists_of(state)))
-        if self._joints.get_subscription_count():
+        if self._joints_wanted:
             self._joints.publish(templates.joints.serialize(
                 stamp, simulation.joint_angles, simulation.joint_rates))
         if self._contacts.get_subscription_count():

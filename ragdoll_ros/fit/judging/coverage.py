@@ -21,8 +21,11 @@ bodies' volume counts as the skin's."""
 
 def find_uncovered(doll: Ragdoll, character: Character,
                    parts: dict[str, tuple[str, ...]]) -> list[Finding]:
-    """Bodies that miss their skin; ``parts`` lists the character's bones of each body."""
-    body_of = {bone: name for name, bones in parts.items() for bone in bones}
+    """Bodies that miss their skin; ``parts`` lists the character's bones of each body. What a swing
+    moves, such as hair, has no body to be in.
+    """
+    hair = {rider for swing in doll.swings for link in swing.links for rider in link.riders}
+    body_of = {bone: name for name, bones in parts.items() for bone in bones if bone not in hair}
     owners = [body_of.get(name) for name in character.bone_names]
     heaviest = character.weights.argmax(axis=1)
     moved = character.bones[range(len(heaviest)), heaviest]
@@ -38,7 +41,9 @@ def find_uncovered(doll: Ragdoll, character: Character,
         if share < DOUBTFUL_COVERAGE:
             found.append(Finding(f'{bone.name} covers {100 * share:.0f} % of its skin',
                                  share < WRONG_COVERAGE))
-    whole = float(covered(doll.bones, character.vertices, tolerance).mean())
+    swung = [index for index, name in enumerate(character.bone_names) if name in hair]
+    rigid = character.vertices[~(moved[:, None] == swung).any(axis=1)]
+    whole = float(covered(doll.bones, rigid, tolerance).mean())
     if whole < 0.9:
         found.append(Finding(f'the bodies cover {100 * whole:.0f} % of the skin',
                              whole < DOUBTFUL_COVERAGE))

@@ -76,6 +76,11 @@ class BodySubscriptions:
                                              (Twist, 'cmd_vel', self.on_cmd_vel, names[0]))
             if name in own] for name in dict.fromkeys((*names[0], *names[1]))}
 
+    @property
+    def moved_by(self) -> dict[str, list[str]]:
+        """Topics, as they are remapped, by the name of what they move."""
+        return {name: self.topics(name) for name in self._subscriptions}
+
     def topics(self, name: str) -> list[str]:
         """Topics that move a body or robot, as they are remapped."""
         return [subscription.topic_name for subscription in self._subscriptions[name]]
@@ -131,7 +136,13 @@ class BodySubscriptions:
 
     def _aim(self, name: str, angles: dict[str, float], rates: dict[str, float],
              known: dict[str, bool]) -> None:
-        """Set targets of a doll's motors; a joint that turns without end goes the shorter way."""
+        """Set targets of a doll's motors; a joint that turns without end goes the shorter way.
+        Raises UnknownJoint: none of these is the doll's.
+        """
+        named = {**angles, **rates}
+        if named and not named.keys() & known.keys():
+            raise errors.UnknownJoint('name', next(iter(named)),
+                                      errors.one_of(list(known), next(iter(named))))
         scene = self.simulation.scene
         placement, = (each for each in scene.dolls if each.name == name)
         present = dict(zip(scene.angle_names, self.simulation.joint_angles.tolist(), strict=True))
