@@ -389,14 +389,15 @@ def test_uses_an_edited_scene_or_says_why_not(node, remote, tmp_path):
     assert remote.frame.scene.name == 'heavier'
 
 
-def test_a_node_takes_a_fixed_root_unless_its_engine_cannot(node, remote):
+def test_a_node_takes_a_fixed_root_unless_its_engine_cannot(no_node, nodes, remote):
     """Its URDF stays the same, so the page has to learn of it from the file."""
+    pytest.importorskip('numba')
+    nodes.append(start('node', compiled=True))
     remote.request(OPEN)
     drop = seen(remote).scene
     free = dataclasses.replace(drop, dolls=(dataclasses.replace(drop.dolls[0], spin=(0, 0, 0)),))
     fixed = dataclasses.replace(free, dolls=(
         dataclasses.replace(free.dolls[0], fixed_root=True),))
-    engine = remote.status.engine
     remote.set_scene(free)
     wait(lambda: remote.frame.scene == free)
     remote.set_engine('bullet')
@@ -408,8 +409,7 @@ def test_a_node_takes_a_fixed_root_unless_its_engine_cannot(node, remote):
     root = drop.bone_names.index(drop.dolls[0].doll.root.name)
     assert remote.frame.state.positions[root] == pytest.approx(
         drop.dolls[0].bone_pose(drop.bones[root]).position, abs=1e-6)
-    remote.set_scene(drop)
-    remote.set_engine(engine)
+    end(nodes[-1], signal.SIGINT)
 
 
 def test_a_scene_that_is_not_here_is_shown_by_its_urdf(node, remote, peer, tmp_path):
