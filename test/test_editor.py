@@ -23,8 +23,9 @@ from ragdoll_ros.files.scene import load_scene, save_scene  # noqa: E402
 from ragdoll_ros.fit.judging.finding import Finding  # noqa: E402
 from ragdoll_ros.fit.judging.verdict import Verdict  # noqa: E402
 from ragdoll_ros.model import errors, rotation  # noqa: E402
-from ragdoll_ros.model.ragdoll import joint_frame  # noqa: E402
-from ragdoll_ros.model.scene import above_ground  # noqa: E402
+from ragdoll_ros.model.follow import Follow  # noqa: E402
+from ragdoll_ros.model.ragdoll import Bone, Ragdoll, joint_frame  # noqa: E402
+from ragdoll_ros.model.scene import Placement, Scene, above_ground  # noqa: E402
 from ragdoll_ros.physics.simulation import Simulation  # noqa: E402
 from ragdoll_ros.recordings.recording import Recording  # noqa: E402
 from ragdoll_ros.viewer.editor import changes, scene_folder  # noqa: E402
@@ -182,6 +183,87 @@ def test_what_is_refused_is_told_in_words_at_the_field_that_was_changed(desk, ke
     desk.editor.update()
     assert {key: re.sub('<.*?>', '', said) for key, said in errors_in(desk.panel).items()} == {
         key: words}
+
+
+def fix_root(desk):
+    """Fix the first doll's root by its field."""
+    placement = desk.editor.scene.dolls[0]
+    desk.editor.select(desk.editor.scene.qualified(placement, placement.doll.root.name))
+    desk.panel.body['fixed_root'].value = True
+    desk.editor.update()
+
+
+def placed(scene, **fields):
+    """The scene with fields of its first doll replaced."""
+    return dataclasses.replace(scene, dolls=(
+        dataclasses.replace(scene.dolls[0], **fields), *scene.dolls[1:]))
+
+
+def test_a_root_is_fixed_to_the_world_saved_and_undone(server, tmp_path):
+    scene = placed(DROP, spin=(0, 0, 0))
+    desk, fixed = Desk(server, tmp_path, scene), placed(scene, fixed_root=True)
+    desk.editor.select('left_shin')
+    assert not any(desk.panel.body[key].visible for key in ('fixed_root', 'velocity', 'spin'))
+    fix_root(desk)
+    assert desk.editor.scene == fixed and desk.asked == [fixed]
+    assert '>torso (fixed)<' in desk.panel.tree._html.content
+    desk.files.name.value = 'hung'
+    desk.files.save()
+    assert load_scene(str(desk.path / 'hung.yaml')) == fixed
+    desk.editor.undo()
+    assert desk.editor.scene == scene and not desk.panel.body['fixed_root'].value
+    assert '(fixed)' not in desk.panel.tree._html.content
+    desk.editor.redo()
+    assert desk.editor.scene == fixed and desk.panel.body['fixed_root'].value
+    desk.panel.body['fixed_root'].value = False
+    desk.editor.update()
+    assert desk.editor.scene == scene
+
+
+@pytest.mark.parametrize('key', ['velocity', 'spin'])
+def test_a_root_is_fixed_once_the_doll_has_no_velocity(server, tmp_path, key):
+    moving = placed(DROP, **{'spin': (0, 0, 0), key: (0.1, 0, -1 / 3)})
+    desk = Desk(server, tmp_path, moving)
+    fix_root(desk)
+    assert {key: re.sub('<.*?>', '', said) for key, said in errors_in(desk.panel).items()} == {
+        key: f'{key} must be none: the root is fixed, not 0.1, 0, -0.3333333'}
+    assert desk.editor.scene == moving and desk.asked == []
+    desk.panel.body[key].value = '0 0 0'
+    desk.editor.update()
+    assert desk.editor.scene == placed(DROP, spin=(0, 0, 0), fixed_root=True)
+
+
+@pytest.mark.parametrize(('key', 'placement'), [
+    ('follow', Placement(Ragdoll('hammer', (Bone('hammer', HAMMER, 1.0, (0, 0, 1)),)),
+                         follow=Follow())),
+    ('animation', dataclasses.replace(load_scene('walker_faints').dolls[0],
+                                      velocity=(0, 0, 0)))])
+def test_a_root_that_something_else_moves_is_not_fixed(server, tmp_path, key, placement):
+    desk = Desk(server, tmp_path, Scene('moves', (placement,)))
+    fix_root(desk)
+    assert {key: re.sub('<.*?>', '', said) for key, said in errors_in(desk.panel).items()} == {
+        'fixed_root': f'root fixed to the world must be off for a doll with {key}'}
+    assert desk.asked == [] and not desk.editor.scene.dolls[0].fixed_root
+
+
+@pytest.mark.parametrize('engine', ['bullet', 'mujoco'])
+def test_an_engine_that_fixes_no_roots_is_told(server, tmp_path, engine):
+    pytest.importorskip('pybullet' if engine == 'bullet' else 'mujoco')
+    scene = placed(DROP, spin=(0, 0, 0))
+    source, desk = SimulationSource(scene, engine), Desk(server, tmp_path, scene)
+    try:
+        desk.use = source.set_scene
+        fix_root(desk)
+        assert re.sub('<.*?>', '', desk.panel.message.content) == (
+            f'engine: expected rigid, which holds roots that are fixed, not {engine}')
+        assert desk.editor.scene == scene
+        source.set_engine('rigid')
+        desk.editor.update()
+        assert desk.editor.scene.dolls[0].fixed_root
+        with pytest.raises(errors.RagdollError, match='rigid, which holds roots that are fixed'):
+            source.set_engine(engine)
+    finally:
+        source.close()
 
 
 def test_a_bone_without_a_partner_is_told_as_such(desk):

@@ -389,6 +389,29 @@ def test_uses_an_edited_scene_or_says_why_not(node, remote, tmp_path):
     assert remote.frame.scene.name == 'heavier'
 
 
+def test_a_node_takes_a_fixed_root_unless_its_engine_cannot(no_node, nodes, remote):
+    """Its URDF stays the same, so the page has to learn of it from the file."""
+    pytest.importorskip('numba')
+    nodes.append(start('node', compiled=True))
+    remote.request(OPEN)
+    drop = seen(remote).scene
+    free = dataclasses.replace(drop, dolls=(dataclasses.replace(drop.dolls[0], spin=(0, 0, 0)),))
+    fixed = dataclasses.replace(free, dolls=(
+        dataclasses.replace(free.dolls[0], fixed_root=True),))
+    remote.set_scene(free)
+    wait(lambda: remote.frame.scene == free)
+    remote.set_engine('bullet')
+    with pytest.raises(RagdollError, match='rigid, which holds roots that are fixed'):
+        remote.set_scene(fixed)
+    remote.set_engine('rigid')
+    remote.set_scene(fixed)
+    wait(lambda: remote.frame.scene == fixed and remote.frame.time > 0.5)
+    root = drop.bone_names.index(drop.dolls[0].doll.root.name)
+    assert remote.frame.state.positions[root] == pytest.approx(
+        drop.dolls[0].bone_pose(drop.bones[root]).position, abs=1e-6)
+    end(nodes[-1], signal.SIGINT)
+
+
 def test_a_scene_that_is_not_here_is_shown_by_its_urdf(node, remote, peer, tmp_path):
     """The file is another one by now: what the node took is what is shown."""
     path, scene = tmp_path / 'mine.yaml', load_scene('crowd')

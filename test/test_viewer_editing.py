@@ -277,3 +277,24 @@ def test_a_joint_range_is_dragged_by_its_edge(view):
     view.button('Undo').wait_for()
     view.key('h')
     run(view)
+
+
+def test_a_root_is_fixed_by_its_checkbox(view):
+    """Not while the doll spins; then it hangs by its torso, also where the page runs it."""
+    view.tab('Edit')
+    row(view, 'torso').click()
+    view.field('Root fixed to the world').check()
+    view.press('Update')
+    view.see('spin must be none: the root is fixed')
+    view.field('Spin, rad/s').fill('0 0 0')
+    view.press('Update')
+    view.wait(lambda: row(view, 'torso').text_content() == 'torso (fixed)')
+    assert saved(view).dolls[0].fixed_root
+    index = SCENE.bone_index('torso')
+    moved = np.arange(len(START)) != index
+    view.press('Play')
+    view.wait(lambda: abs(view.bodies(SCENE) - START)[moved].max() > 0.05)
+    assert view.bodies(SCENE)[index] == pytest.approx(START[index], abs=1e-6)
+    view.press('Undo: numbers of torso')
+    view.wait(lambda: row(view, 'torso').text_content() == 'torso')
+    assert saved(view) == SCENE

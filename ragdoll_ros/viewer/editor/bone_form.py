@@ -26,7 +26,7 @@ SHARED = ('mass', *SURFACE, 'color', 'damping')
 """Fields that several bones can have in common."""
 
 MAXIMA = {'mass': 1e6, 'size': 1e3, 'radius': 1e3, 'length': 1e3, 'position': 1e3, 'anchor': 1e3,
-          'damping': 1e4}
+          'damping': 1e4, 'velocity': 1e3, 'spin': 1e3}
 """In the units of the fields. Bodies far beyond their neighbours in mass or distance stop the
 simulation for minutes."""
 
@@ -47,7 +47,16 @@ BODY = (
     Field('restitution', 'Restitution', 'text', "0 to 1; empty: the scene's"),
     Field('color', 'Colour', 'color', 'Picked, or typed: red, #1e90ff, 30 144 255'),
     Field('no_collision', 'Passes through', 'text', 'Names of other bones of the doll, with which '
-          'this one does not collide; those that a joint connects never do'))
+          'this one does not collide; those that a joint connects never do'),
+    Field('velocity', 'Velocity, m/s', 'vector', "Of the doll's centre of mass at the start, world "
+          'frame'),
+    Field('spin', 'Spin, rad/s', 'vector', 'Angular velocity of the whole doll at the start, world '
+          'frame'),
+    Field('fixed_root', 'Root fixed to the world', 'checkbox',
+          'It stays where it is, whatever acts on it; engine rigid'))
+
+PLACEMENT = ('fixed_root', 'velocity', 'spin')
+"""Keys of a root's fields that are of its doll in the scene."""
 
 JOINT = (
     Field('kind', 'Joint', 'joint', 'To the parent'),
@@ -62,8 +71,11 @@ JOINT = (
 
 
 def read_bone(scene: Scene, name: str) -> FormValues:
-    """Values of a bone and its joint; UnknownBone. Compound shapes have no shape values."""
-    _, bone = changes.find(scene, name)
+    """Values of a bone and its joint; UnknownBone. Compound shapes have no shape values.
+
+    A root also has those of PLACEMENT.
+    """
+    placement, bone = changes.find(scene, name)
     shape = {'shape': bone.shape.kind, **vars(bone.shape)} if bone.shape.kind in SHAPES else {}
     values: FormValues = {**shape, 'mass': bone.mass,
                           'inertia': ', '.join(f'{moment:.9g}' for moment in bone.moments or ()),
@@ -75,7 +87,9 @@ def read_bone(scene: Scene, name: str) -> FormValues:
         values[key] = '' if value is None else f'{value:.9g}'
     values['no_collision'] = _join_names(_passed_through(scene, name))
     joint = changes.joint_of(scene, name)
-    return values if joint is None else {**values, **_read_joint(joint)}
+    if joint is None:
+        return {**values, **{key: getattr(placement, key) for key in PLACEMENT}}
+    return {**values, **_read_joint(joint)}
 
 
 def read_bones(scene: Scene, names: Sequence[str]) -> FormValues:
@@ -138,6 +152,7 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
             (('color',), color),
             (('no_collision',), lambda scene, new: changes.set_no_collision(
                 scene, name, _split_names(new['no_collision']))),
+            (PLACEMENT, lambda scene, new: _set_placement(scene, name, new)),
             *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
               for key in SURFACE)]
 
@@ -147,6 +162,17 @@ def _joint_steps(name: str, shown: FormValues) -> list[Step]:
              lambda scene, new: _set_axes_and_limits(scene, name, new, shown)),
             *(((key,), lambda scene, new, key=key: changes.change_joint(
                 scene, name, **{key: new[key]})) for key in ('anchor', 'damping'))]
+
+
+def _set_placement(scene: Scene, name: str, new: FormValues) -> Scene:
+    """Set the fields of PLACEMENT together, as a fixed root has no velocity."""
+    try:
+        return changes.change_placement(scene, name, **{key: new[key] for key in PLACEMENT})
+    except errors.ModelError as error:
+        # What else the doll has, it has not from this form.
+        if (key := error.path.rsplit('.', 1)[-1]) not in PLACEMENT:
+            raise errors.WrongForm('fixed_root', '', f'off for a doll with {key}') from None
+        raise
 
 
 def _read_joint(joint: Joint) -> FormValues:

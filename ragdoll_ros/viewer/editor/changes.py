@@ -54,9 +54,15 @@ def joint_of(scene: Scene, name: str) -> Joint | None:
 def replace_doll(scene: Scene, placement: Placement, **fields: object) -> Scene:
     """Replace fields of one doll."""
     doll = dataclasses.replace(placement.doll, **fields)
-    return dataclasses.replace(scene, dolls=tuple(
-        dataclasses.replace(placement, doll=doll) if each is placement else each
-        for each in scene.dolls))
+    return _with_placement(scene, placement, dataclasses.replace(placement, doll=doll))
+
+
+def change_placement(scene: Scene, name: str, **fields: object) -> Scene:
+    """Set fields of a bone's doll in the scene: velocity, spin, fixed_root."""
+    placement, _ = find(scene, name)
+    with _errors_at(name):
+        changed = dataclasses.replace(placement, **fields)
+    return _with_placement(scene, placement, changed)
 
 
 def change_bone(scene: Scene, name: str, **fields: object) -> Scene:
@@ -289,6 +295,10 @@ def _move_limb(scene: Scene, placement: Placement, bone: Bone, moved: Bone) -> S
                    for swing in doll.swings)
     return replace_doll(scene, placement, bones=_replaced(bones, bones[doll.bones.index(bone)],
                                                          moved), joints=joints, swings=swings)
+
+
+def _with_placement(scene: Scene, old: Placement, new: Placement) -> Scene:
+    return dataclasses.replace(scene, dolls=_replaced(scene.dolls, old, new))
 
 
 def _replaced(items: tuple, old: object, new: object) -> tuple:

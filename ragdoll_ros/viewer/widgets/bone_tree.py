@@ -27,8 +27,11 @@ class BoneTree:
         self._html = gui.add_html('')
 
     def show(self, scene: Scene, placement: Placement, selected: Sequence[str]) -> None:
-        """Show the bones of a doll, each below its parent; mark those that are ``selected``."""
-        rows = [_row(scene.qualified(placement, bone), bone, depth, selected)
+        """Show the bones of a doll, each below its parent; mark those that are ``selected``, and
+        a root that is fixed.
+        """
+        rows = [_row(scene.qualified(placement, bone),
+                     bone + ' (fixed)' * (placement.fixed_root and depth == 0), depth, selected)
                 for bone, depth in depths(placement)]
         content = ('<div class="ragdoll-tree" role="tree" tabindex="0" aria-label="Bones" '
                    f'aria-multiselectable="true">{"".join(rows)}</div>'

@@ -240,6 +240,8 @@ def _widget(gui: viser.GuiApi, field: Field) -> Any:
     if field.widget in ('shape', 'joint'):
         return gui.add_dropdown(field.label, tuple(SHAPES if field.widget == 'shape'
                                                    else JOINT_KINDS), hint=hint)
+    if field.widget == 'checkbox':
+        return gui.add_checkbox(field.label, False, hint=hint)
     if field.widget == 'color':
         return gui.add_rgb(field.label, (0, 0, 0), hint=hint)
     return gui.add_text(field.label, '', hint=hint)
