@@ -311,3 +311,10 @@ def test_an_arm_gives_way_at_its_torque(accuracy):
     assert angle == pytest.approx(math.atan2(0.08, 0.15) - math.asin(0.05 / distance), abs=1e-5)
     assert contacts.forces.sum() == pytest.approx(1.2 / math.sqrt(distance ** 2 - 0.05 ** 2),
                                                   rel=1e-3)
+
+
+def test_what_is_pushed_first_is_no_fixed_root():
+    scene = hung(chain(3))
+    assert scene.first_pushed_bone == 'b1'
+    assert dataclasses.replace(scene, dolls=(Placement(chain(3)),)).first_pushed_bone == 'b0'
+    assert hung(chain(1)).first_pushed_bone == 'b0'

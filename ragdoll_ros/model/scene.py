@@ -391,6 +391,17 @@ class Scene:
         counts = [own.stop - own.start for own in self.bone_slices]
         return np.repeat(np.arange(len(counts)), counts)
 
+    @property
+    def first_pushed_bone(self) -> str:
+        """Name of the bone that is pushed until another is chosen: the first doll's root, or where
+        that is fixed a bone that hangs on it.
+        """
+        first = self.dolls[0]
+        name = first.doll.root.name
+        if first.fixed_root and first.doll.joints:
+            name = first.doll.joints_from_root()[0].child
+        return self.qualified(first, name)
+
     @cached_property
     def yielding_bones(self) -> np.ndarray:
         """(n,) which bones forces move: no fixed roots, and none of what follows exactly."""

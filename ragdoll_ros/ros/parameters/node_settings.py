@@ -44,7 +44,7 @@ class NodeSettings:
     start_paused: bool = _parameter(False, 'Start paused, until ~/pause resumes')
     pushed_bone: str = _parameter(
         '', 'Bone that ~/force and cmd_vel push', constraints='one of bone_names',
-        scene_default=lambda scene: scene.qualified(scene.dolls[0], scene.dolls[0].doll.root.name))
+        scene_default=lambda scene: scene.first_pushed_bone)
     push_timeout: float = _parameter(
         0.1, 'Simulated time that a push acts unless the next one comes first, s', (0.001, 60.0))
     cmd_vel_timeout: float = _parameter(

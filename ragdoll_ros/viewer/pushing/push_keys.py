@@ -164,9 +164,14 @@ class PushKeys:
         if self._scene is None or shown == self._shown_effect:
             return
         self._shown_effect = shown
-        text = (f'Pushes {self._scene.bone_names[self.bone]}. A click chooses another bone.'
-                f'<br>A tap gives {self._mass():.3g} kg '
-                f'{self.strength.value * TAP / self._mass():.2g} m/s in the air.')
+        text = f'Pushes {self._scene.bone_names[self.bone]}. A click chooses another bone.<br>'
+        if not self._scene.yielding_bones[self.bone]:
+            text += 'Nothing moves this one: it is fixed, or moves as it is told.'
+        elif self._scene.dolls[self._scene.doll_of_bone[self.bone]].fixed_root:
+            text += 'It hangs on a root that is fixed.'
+        else:
+            text += (f'A tap gives {self._mass():.3g} kg '
+                     f'{self.strength.value * TAP / self._mass():.2g} m/s in the air.')
         if self._scene.ground is not None and math.isinf(self._scene.material.friction):
             text += ' Friction is unlimited: what lies on the ground does not slide.'
         self._effect.content = (

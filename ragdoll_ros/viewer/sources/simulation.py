@@ -97,7 +97,7 @@ class SimulationSource(Source):
         scene = self._simulation.scene
         if self._pushed_bone in scene.bone_names:
             return self._pushed_bone
-        return scene.qualified(scene.dolls[0], scene.dolls[0].doll.root.name)
+        return scene.first_pushed_bone
 
     def request(self, requested: RequestedData) -> None:
         if requested != self._requested:
