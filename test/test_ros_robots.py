@@ -225,8 +225,10 @@ def test_joint_states_move_an_arm_that_gives_way(make_node, peer, tmp_path):
     for _ in range(400):
         node.tick()
     assert node.simulation.joint_angles[-2:] == pytest.approx([-0.4, 0.3], abs=1e-3)
+    assert node.bodies.silent == ('arm',), 'for 4 s'
     states.publish(joints(('shoulder', 'elbow'), (math.tau + 1.2, 0.0)))
     peer.wait(lambda: targets()['arm/shoulder'] == pytest.approx(1.2))
+    assert node.bodies.silent == ()
     for _ in range(300):
         node.tick()
     contacts = node.simulation.contacts

@@ -19,6 +19,7 @@ from .messages.convert import to_time
 
 if TYPE_CHECKING:  # else the page and the teleop, which import this file, would load an engine
     from ..physics.simulation import Simulation
+    from .inputs.bodies.body_subscriptions import BodySubscriptions
 
 PERIOD = 1.0
 """s of the steady clock between two reports."""
@@ -37,14 +38,14 @@ class Diagnostics:
     """Measures the cost of ticks; reports real-time factor, cost, error measures and counters.
 
     ``node_values()``: values of the node to report, by key; ``stamp()``: stamp of a report, ns;
-    ``body_topics(name)``: the topics that move a body.
+    ``bodies``: what is driven, which topics move it, and what none does.
     """
 
     def __init__(self, node: Node, steady: Clock, counts: InputCounts,
                  node_values: Callable[[], dict], stamp: Callable[[], int],
-                 body_topics: Callable[[str], list[str]]) -> None:
+                 bodies: BodySubscriptions) -> None:
         self._node, self._steady, self._counts = node, steady, counts
-        self._body_topics = body_topics
+        self._bodies = bodies
         self._node_values, self._stamp = node_values, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._last_counted = self._last_dropped = self._last_bad = 0
@@ -109,8 +110,8 @@ class Diagnostics:
             warnings.append(f'{values["namesakes"] + 1} nodes have this name')
         warnings += filter(None, [values['unheard_cmd_vel']])
         warnings += self._lag_warnings(requested, values)
-        if requested and (stale := self.simulation.stale_bodies):
-            warnings += [f'nothing moves {name}: {", ".join(self._body_topics(name))} are silent'
+        if requested and (stale := self._bodies.silent):
+            warnings += [f'nothing moves {name}: {", ".join(self._bodies.topics(name))} are silent'
                          for name in stale[:MOST_STALE]]
             if len(stale) > MOST_STALE:
                 warnings.append(f'nor {len(stale) - MOST_STALE} other bodies')

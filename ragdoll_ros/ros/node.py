@@ -117,7 +117,7 @@ class RagdollNode(Node):
         self.interactive = InteractiveMarkerServer(self, self.input_counts, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
                                         self._diagnostic_values, self._diagnostics_stamp,
-                                        self.bodies.topics)
+                                        self.bodies)
         Services(self, self)
         self.simulation_interfaces = SimulationInterfaces(self, self, self._steady,
                                                           self._show_if_paused)

@@ -19,6 +19,7 @@ from ....model import errors, rotation
 from ....model.drive import MAX_SPEED
 from ....model.scene import Scene
 from ....model.vectors import unit_vector
+from ....physics.actions.body_motion import TIMEOUT
 from ....physics.simulation import Simulation
 from ...messages.convert import from_time
 from ...parameters.node_settings import NodeSettings
@@ -53,6 +54,8 @@ class BodySubscriptions:
         """By the name of the body or robot."""
         self._names: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
         """Of all that is driven, and of what has joints."""
+        self._aimed: dict[str, int] = {}
+        """Simulated times, ns, at which dolls got targets last, by name."""
         self._frames = BodyFrames(node, self._drive_by_frame, counts.refuse)
         self.simulation: Simulation
 
@@ -68,6 +71,7 @@ class BodySubscriptions:
         for subscription in itertools.chain(*self._subscriptions.values()):
             self._node.destroy_subscription(subscription)
         self._names = names
+        self._aimed.clear()
         self._subscriptions = {name: [
             self._node.create_subscription(kind, f'{body_topic(name)}/{end}',
                                            partial(callback, name), 10)
@@ -75,6 +79,13 @@ class BodySubscriptions:
                                              (Odometry, 'odom', self.on_odometry, names[0]),
                                              (Twist, 'cmd_vel', self.on_cmd_vel, names[0]))
             if name in own] for name in dict.fromkeys((*names[0], *names[1]))}
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """What nothing moves: stale bodies, and dolls whose joint states have ended."""
+        now = self.simulation.time
+        return (*self.simulation.stale_bodies,
+                *(name for name, time in self._aimed.items() if now - time > TIMEOUT))
 
     @property
     def moved_by(self) -> dict[str, list[str]]:
@@ -152,6 +163,7 @@ class BodySubscriptions:
                 angles[joint] += math.tau * round((present[own[joint]] - angles[joint]) / math.tau)
         self.simulation.set_pose_target(*({own[joint]: value for joint, value in values.items()}
                                           for values in (angles, rates)))
+        self._aimed[name] = self.simulation.time
 
     def _note_unknown(self, name: str, joints: list[str]) -> None:
         """Log, once for each, joints that the robot of this name does not have."""
