@@ -83,7 +83,8 @@ def test_real_time_factor_changes_from_here_on(playing):
     assert (playback.frame.time, playback.status.real_time_factor) == (360, 50)
     before = time.monotonic()
     playback.pause(False)
-    while time.monotonic() < before + 0.01:
+    after = time.monotonic()
+    while time.monotonic() < after + 0.01:
         pass
     assert 360 + 50 * 0.01 <= playback.frame.time + 1e-9 <= 360 + 50 * (time.monotonic() - before)
     with pytest.raises(errors.OutOfRange, match='real_time_factor'):

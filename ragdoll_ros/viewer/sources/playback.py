@@ -61,16 +61,17 @@ class PlaybackSource(Source):
 
     def request(self, requested: RequestedData) -> None:
         with self._lock:
-            self._continue_from(self._now())
+            self._note_time()
             self._is_open = requested.frames
 
     def pause(self, paused: bool) -> bool:
         """Pause or resume; at the end it is paused, and resumes from the start."""
         with self._lock:
-            instant = self._now()
-            at_end = instant >= self._recording.duration
+            self._note_time()
+            at_end = self._time >= self._recording.duration
             self._paused = paused and not at_end
-            self._continue_from(0.0 if at_end and not paused else instant)
+            if at_end and not paused:
+                self._continue_from(0.0)
         return True
 
     def step(self) -> None:
@@ -92,7 +93,7 @@ class PlaybackSource(Source):
     def set_real_time_factor(self, factor: float) -> None:
         errors.check_range('real_time_factor', factor, *REAL_TIME_FACTORS)
         with self._lock:
-            self._continue_from(self._now())
+            self._note_time()
             self._real_time_factor = factor
 
     def load(self, name: str) -> None:
@@ -106,10 +107,19 @@ class PlaybackSource(Source):
 
     def _now(self) -> float:
         """Instant of the recording, s."""
+        return self._at(time.monotonic())
+
+    def _at(self, wall: float) -> float:
+        """Instant of the recording, s, at a wall time."""
         elapsed = 0.0
         if self._is_open and not self._paused:
-            elapsed = (time.monotonic() - self._since) * self._real_time_factor
+            elapsed = (wall - self._since) * self._real_time_factor
         return min(self._time + elapsed, self._recording.duration)
+
+    def _note_time(self) -> None:
+        """Count from here on, without a gap: what follows changes how time passes."""
+        wall = time.monotonic()
+        self._time, self._since = self._at(wall), wall
 
     def _continue_from(self, instant: float) -> None:
         self._time, self._since = instant, time.monotonic()
