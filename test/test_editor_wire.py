@@ -105,7 +105,8 @@ def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
 def test_editing_ends_where_the_page_goes_on(page, browser):
     page.editor.select('head')
     browser.press_button(page.editor.panel.edit)
-    wait(lambda: page.editor.handles.body is not None
+    # The bar shows nothing before the page's first frame.
+    wait(lambda: page.editor.handles.body is not None and page.transport.shown is not None
          and not page.transport.shown.playing)
     browser.press(page, 'Play or pause')
     wait(lambda: page.editor.handles.body is None)

@@ -61,7 +61,7 @@ def test_loading_is_shown_to_all_until_it_has_ended(page, monkeypatch):
     load, go = page.source.load, threading.Event()
     monkeypatch.setattr(page.source, 'load', lambda name: (go.wait(60), load(name)))
     click(page, 'crowd')
-    wait(lambda: page.transport.shown.loading == 'crowd')
+    wait(lambda: page.transport.shown and page.transport.shown.loading == 'crowd')
     wait(lambda: 'aria-busy' in page.gallery.cards['crowd'].content)
     assert 'Loading' in page.gallery.cards['crowd'].content
     go.set()
