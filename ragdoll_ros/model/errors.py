@@ -2,9 +2,10 @@
 from __future__ import annotations
 
 import bisect
+import contextlib
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 MAX_LISTED_NAMES = 40
@@ -141,6 +142,21 @@ class ModelErrors(RagdollError):
         count = f'{len(self.errors)} error{"s" * (len(self.errors) != 1)}'
         return '\n'.join([f'{self.file}: {count}', *(
             f'  {error}' if error.path else f'  file: {error}' for error in self.errors)])
+
+
+@contextlib.contextmanager
+def naming(path: str) -> Iterator[None]:
+    """Raise ModelErrors that name a file for what is wrong with it or keeps it from being read."""
+    try:
+        yield
+    except ModelErrors:
+        raise
+    except ModelError as error:
+        raise ModelErrors(path, [error]) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, 'strerror', None) or str(error)
+        unreadable = Unreadable('', reason, 'a file that can be read')
+        raise ModelErrors(path, [unreadable]) from None
 
 
 def check_finite(path: str, values: object) -> None:

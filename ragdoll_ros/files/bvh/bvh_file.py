@@ -115,15 +115,9 @@ def read_bvh(path: str) -> BvhFile:
 
     Raises ModelErrors with the file's name and the line.
     """
-    try:
+    with errors.naming(path):
         stat = os.stat(path)
         return _read(path, (stat.st_mtime_ns, stat.st_size))
-    except errors.ModelError as error:
-        raise errors.ModelErrors(path, [error]) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, 'strerror', None) or str(error)
-        unreadable = errors.Unreadable('', reason, 'a file that can be read')
-        raise errors.ModelErrors(path, [unreadable]) from None
 
 
 @functools.lru_cache(maxsize=4)

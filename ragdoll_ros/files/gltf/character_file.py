@@ -1,10 +1,8 @@
 """The file of a fitted character: its nodes, bones and animations, and where its doll is in it."""
 from __future__ import annotations
 
-import contextlib
 import functools
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,24 +41,9 @@ def read_character_file(doll: Ragdoll) -> CharacterFile:
     if doll.model is None or not doll.riders:
         raise errors.WrongForm('model', doll.model, 'the .glb, .gltf or .vrm of a character that '
                                'ragdoll_fit made the doll of')
-    with naming(doll.model):
+    with errors.naming(doll.model):
         stat = os.stat(doll.model)
         return _read(doll.model, (stat.st_mtime_ns, stat.st_size))
-
-
-@contextlib.contextmanager
-def naming(path: str) -> Iterator[None]:
-    """Raise ModelErrors that name a file for what is wrong with it or keeps it from being read."""
-    try:
-        yield
-    except errors.ModelErrors:
-        raise
-    except errors.ModelError as error:
-        raise errors.ModelErrors(path, [error]) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, 'strerror', None) or str(error)
-        unreadable = errors.Unreadable('', reason, 'a file that can be read')
-        raise errors.ModelErrors(path, [unreadable]) from None
 
 
 @functools.lru_cache(maxsize=4)

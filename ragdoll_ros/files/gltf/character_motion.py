@@ -19,7 +19,6 @@ from .character_file import (
     CharacterFile,
     bind_pose,
     file_to_doll,
-    naming,
     read_character_file,
     rider_of,
     rider_pose,
@@ -91,7 +90,7 @@ class CharacterMotion:
 def read_character_motions(doll: Ragdoll) -> dict[str, CharacterMotion]:
     """The animations of the file of a doll's character, by their names; see load_animations()."""
     source = read_character_file(doll)
-    with naming(source.path):
+    with errors.naming(source.path):
         if not source.animations:
             return {}
     to_doll = file_to_doll(doll, source)
