@@ -20,7 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
-from std_msgs.msg import Float64, String
+from std_msgs.msg import String
 
 from ....files.scene import save_scene
 from ....model import errors
@@ -32,6 +32,7 @@ from ....ros.latched_topic import LATCHED
 from ..source import Frame, RequestedData, Source, SourceStatus
 from .frames import NodeFrames
 from .hands import NodeHands
+from .motors import StrengthPublisher
 from .pushes import ForcePublisher, NoInputCounts, ObservedPushes
 from .scene import NodeScene
 from .services import NodeServices, Refused
@@ -78,7 +79,7 @@ class NodeSource(Source):
         self._inputs: PushSubscriptions | None = None
         self._force = ForcePublisher(self._node, NAME)
         self._states = StatePublisher(self._node, NAME)
-        self._strength = self._node.create_publisher(Float64, f'{NAME}/motor_strength', 10)
+        self._strength = StrengthPublisher(self._node, NAME)
         self._requested = RequestedData()
         self._reported = SourceStatus()
         self._simulated_time = 0.0
@@ -144,7 +145,7 @@ class NodeSource(Source):
         self._services.trigger('go_limp')
 
     def set_strength(self, strength: float) -> None:
-        self._strength.publish(Float64(data=float(strength)))
+        self._strength.send(strength)
 
     def set_real_time_factor(self, factor: float) -> None:
         self._services.set_parameter('real_time_factor', float(factor))
@@ -261,10 +262,11 @@ class NodeSource(Source):
                     self._simulated_time = simulated
 
     def _keep_in_touch(self) -> None:
-        """Timer callback: confirm grabs, and request what is unknown."""
+        """Timer callback: confirm grabs, send what waits, and request what is unknown."""
         if time.monotonic() - self._last_message() > SILENCE:
             self._hands.clear()
         self._hands.keep_alive()
+        self._strength.retry()
         self._scene.request()
 
     def _use_scene(self) -> None:
