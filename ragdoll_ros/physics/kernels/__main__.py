@@ -2,7 +2,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import signal
+import subprocess
 import sys
 import time
 
@@ -26,9 +28,14 @@ def main(arguments: list[str] | None = None) -> int:
         print(NOT_READY.format(problem()), file=sys.stderr)
         return 2
     began = time.monotonic()
-    from . import loaded  # noqa: F401  importing compiles
-    from .swing import loaded as swings  # noqa: F401
     from .compiling import cache
+    with contextlib.ExitStack() as stack:
+        if cache.KEPT:  # a process beside this one compiles swings; what fails there fails below
+            stack.enter_context(subprocess.Popen(
+                [sys.executable, '-c', f'import {__package__}.swing.loaded'],
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        from . import loaded  # noqa: F401  importing compiles
+    from .swing import loaded as swings  # noqa: F401
     is_kept = cache.KEPT and cache.KernelCache.failure is None
     kept = f'kept in {cache.FOLDER}' if is_kept else 'kept nowhere'
     print(f'The dynamics are compiled: {time.monotonic() - began:.1f} s, {kept}')

@@ -1,7 +1,7 @@
 """Imports the kernels, which compiles them, in one process at a time; others load them."""
 from .compiling.cache import alone
 
-with alone():
+with alone('rigid'):
     from . import advance
     from .collision import aabb_tree, sweep_and_prune
 

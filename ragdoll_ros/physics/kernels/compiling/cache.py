@@ -175,9 +175,9 @@ def keep(dispatcher: Dispatcher) -> None:
 
 
 @contextlib.contextmanager
-def alone() -> Iterator[None]:
-    """Compile in one process at a time: the others wait and find what the first has saved. Garbage
-    collection is off meanwhile, which saves a seventh of the time.
+def alone(group: str) -> Iterator[None]:
+    """Compile a group of kernels in one process at a time: the others wait and find what the first
+    has saved. Garbage collection is off meanwhile, which saves a seventh of the time.
     """
     with contextlib.ExitStack() as stack:
         if gc.isenabled():
@@ -185,7 +185,7 @@ def alone() -> Iterator[None]:
             stack.callback(gc.enable)
         if FOLDER is not None:
             with contextlib.suppress(OSError, ImportError):  # a system without such locks
-                lock = os.open(FOLDER / 'ragdoll_ros.lock', os.O_RDONLY | os.O_CREAT, 0o666)
+                lock = os.open(FOLDER / f'{group}.lock', os.O_RDONLY | os.O_CREAT, 0o666)
                 stack.callback(os.close, lock)
                 _wait_for(lock)
         try:

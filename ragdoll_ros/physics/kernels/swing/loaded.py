@@ -12,7 +12,7 @@ if ready():
 else:
     alone = contextlib.nullcontext
 
-with alone():
+with alone('swings'):
     from ..maths import oscillator
     from . import advance_chains, chain_modes
 
