@@ -915,7 +915,7 @@ def test_a_file_is_not_written_over_with_another_scene_unasked(desk, other):
     if other == 'from elsewhere':
         desk.editor.show(load_scene('flight'))
     elif other == 'uploaded':
-        desk.files.upload('drop.yaml', desk.files._folder.text(dataclasses.replace(
+        desk.files.upload('drop.yaml', desk.files.folder.text(dataclasses.replace(
             DROP, gravity=(0.0, 0.0, -1.0))))
     else:
         desk.files.fit('bird.glb', fit_rigs.document(fit_rigs.RIGS['bird']).glb())
@@ -1075,7 +1075,7 @@ def test_uploads_have_a_size(desk, monkeypatch):
     ((Finding('a joint hangs'), Finding('no root', wrong=True)), RED, 'wrong')])
 def test_a_verdict_has_the_colour_of_what_it_says(desk, monkeypatch, findings, color, word):
     scene = load_scene('drop')
-    monkeypatch.setattr(desk.files._folder, 'fit', lambda *_: (scene, [Verdict(findings)]))
+    monkeypatch.setattr(desk.files.folder, 'fit', lambda *_: (scene, [Verdict(findings)]))
     desk.files.fit('x.glb', b'')
     lines = desk.said().split('</div>')
     assert color in lines[1] and f'verdict: {word}' in lines[1]

@@ -37,7 +37,7 @@ def yet_more(x):
 """
 USE = """
 from tiny.compiling.cache import alone
-with alone():
+with alone('tiny'):
     from tiny.outer import more, yet_more
 print(more(3.0), yet_more(3.0))
 """

@@ -1,8 +1,10 @@
 """Surfaces of triangles, for static bodies: a mesh, and a height field."""
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,7 +12,7 @@ import numpy as np
 
 from . import errors
 from .errors import set_fields
-from .vectors import finite_floats
+from .vectors import finite_floats, vector
 
 MAX_TRIANGLES = 1_000_000
 
@@ -50,6 +52,12 @@ class Surface:
         """Vertices (v, 3) m and triangles (t, 3)."""
         raise NotImplementedError
 
+    @functools.cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner (3,) m of its bounding box, in its own axes."""
+        vertices, _ = self.mesh()
+        return _frozen(vertices.min(axis=0)), _frozen(vertices.max(axis=0))
+
     def support(self, direction: np.ndarray) -> np.ndarray:
         """Support function (...,) m along unit directions (..., 3), in its own axes."""
         return (np.asarray(direction, float) @ self.mesh()[0].T).max(axis=-1)
@@ -58,8 +66,7 @@ class Surface:
         """Distance (p,) m of points (p, 3) from its bounding box, negative inside: at most that
         from its surface.
         """
-        vertices, _ = self.mesh()
-        lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+        lower, upper = self.bounds
         beyond = np.maximum(lower - points, points - upper)
         return np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
 
@@ -120,6 +127,11 @@ class Mesh(Surface):
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (v, 3) m and triangles (t, 3)."""
         return self.vertices, self.faces
+
+    def scaled(self, factors: Sequence[float]) -> Mesh:
+        """Scaled by factors (3,), each above 0, along its own axes."""
+        source = self.source and (self.source[0], vector(np.multiply(self.source[1], factors)))
+        return dataclasses.replace(self, vertices=self.vertices * factors, source=source)
 
     @functools.cached_property
     def _digest(self) -> bytes:
@@ -198,6 +210,12 @@ class HeightField(Surface):
         a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
         faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], axis=2)
         return (np.stack([x, y, self.heights], axis=-1).reshape(-1, 3), faces.reshape(-1, 3))
+
+    def scaled(self, factors: Sequence[float]) -> HeightField:
+        """Scaled by factors (3,), each above 0, along its own axes."""
+        x, y, z = (float(factor) for factor in factors)
+        source = self.source and (self.source[0], self.source[1] * z)
+        return HeightField(self.heights * z, (self.size[0] * x, self.size[1] * y), source)
 
     @functools.cached_property
     def _digest(self) -> bytes:

@@ -199,6 +199,14 @@ class Editor:
             self.set_scene(static_bodies.add_body(self.scene, name.strip()), f'add {name.strip()}')
             self.select_static(name.strip())
 
+    def add_mesh(self, file: str, content: bytes) -> None:
+        """Add an uploaded mesh as a static body and select it."""
+        with self._reporting_errors():
+            mesh = self.files.folder.mesh(file, content)
+            scene, name = static_bodies.add_mesh(self.scene, Path(mesh.source[0]).stem, mesh)
+            self.set_scene(scene, f'add {name}')
+            self.select_static(name)
+
     def remove_static(self) -> None:
         """Remove the selected static body."""
         with self._reporting_errors():
@@ -216,6 +224,8 @@ class Editor:
         panel.add.on_click(lambda _: self.add_bone(panel.name.value))
         panel.remove.on_click(lambda _: self.remove_limb())
         panel.add_static.on_click(lambda _: self.add_static(panel.static_name.value))
+        panel.add_mesh.on_upload(
+            lambda event: self.files.take_upload(event.target, self.add_mesh))
         panel.remove_static.on_click(lambda _: self.remove_static())
         for button, label, key, modifier, action in (
                 (panel.edit, 'Edit or run', None, None, self.toggle),

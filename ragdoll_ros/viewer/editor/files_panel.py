@@ -35,7 +35,8 @@ class FilesPanel:
 
     def __init__(self, server: viser.ViserServer, scene: Callable[[], Scene],
                  set_scene: Callable[[Scene, str], None], folder: SceneFolder) -> None:
-        self._server, self._scene, self._set_scene, self._folder = server, scene, set_scene, folder
+        self._server, self._scene, self._set_scene = server, scene, set_scene
+        self.folder = folder
         self._fitting = threading.Lock()
         self._current = ''
         """Name of the scene's file, saved or loaded: Save overwrites it."""
@@ -58,8 +59,8 @@ class FilesPanel:
         self.saved.on_update(lambda event: event.client and self._load_listed(event.target.value))
         self._update_list()
         self.actions.on_click(self._on_action)
-        self.upload_button.on_upload(lambda event: self._on_upload(event.target, self.upload))
-        self.fit_button.on_upload(lambda event: self._on_upload(event.target, self.fit))
+        self.upload_button.on_upload(lambda event: self.take_upload(event.target, self.upload))
+        self.fit_button.on_upload(lambda event: self.take_upload(event.target, self.fit))
 
     def _on_action(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
         if event.target.value == 'Save':
@@ -86,11 +87,11 @@ class FilesPanel:
         """Send the scene as a file to the page that asked for it, or to all."""
         name = Path(self.name.value.strip() or 'scene').stem + '.yaml'
         to = client or self._server
-        to.send_file_download(name, self._folder.text(self._scene()), save_immediately=True)
+        to.send_file_download(name, self.folder.text(self._scene()), save_immediately=True)
 
     def upload(self, name: str, content: bytes) -> None:
         """Load the scene or doll of an uploaded YAML file."""
-        self._try(lambda: self._take(self._folder.read(name, content), 'load', name))
+        self._try(lambda: self._take(self.folder.read(name, content), 'load', name))
 
     def fit(self, name: str, content: bytes) -> None:
         """Fit a doll to an uploaded character; one at a time."""
@@ -104,19 +105,28 @@ class FilesPanel:
             self.progress.visible = False
             self._fitting.release()
 
+    def take_upload(self, button: viser.GuiUploadButtonHandle,
+                    action: Callable[[str, bytes], None]) -> None:
+        """Hand the name and the content of an upload to ``action``."""
+        file = button.value
+        content = file.content
+        # The button keeps its last file: release up to 100 MB.
+        file.content = b''
+        action(file.name, content)
+
     def _save(self) -> str:
-        name = self._folder.find(self.name.value).name
-        changed = dict(self._folder.saved()).get(name)
+        name = self.folder.find(self.name.value).name
+        changed = dict(self.folder.saved()).get(name)
         if changed is not None and name not in (self._current, self._to_confirm):
             self._to_confirm = name
             return f'{name} of {changed:{TIME}} exists: press Save again to overwrite it'
-        name = self._current = self._folder.save(self._scene(), self.name.value).name
+        name = self._current = self.folder.save(self._scene(), self.name.value).name
         self._to_confirm = ''
         return f'saved {name}'
 
     def _load(self) -> str:
-        message = self._take(self._folder.load(self.name.value), 'load', self.name.value.strip())
-        self._current = self._folder.find(self.name.value).name
+        message = self._take(self.folder.load(self.name.value), 'load', self.name.value.strip())
+        self._current = self.folder.find(self.name.value).name
         return message
 
     def _load_listed(self, entry: str) -> None:
@@ -127,12 +137,12 @@ class FilesPanel:
 
     def _update_list(self) -> None:
         """List the files in the folder."""
-        entries = [f'{name} · {changed:%Y-%m-%d}' for name, changed in self._folder.saved()]
+        entries = [f'{name} · {changed:%Y-%m-%d}' for name, changed in self.folder.saved()]
         self.saved.options = (NONE, *entries)
         self.saved.value = NONE
 
     def _fitted(self, name: str, content: bytes) -> list[Line]:
-        scene, verdicts = self._folder.fit(name, content, self._show_progress)
+        scene, verdicts = self.folder.fit(name, content, self._show_progress)
         lines: list[Line] = [(self._take(scene, 'fit', name), GREEN)]
         for placement, verdict in zip(scene.dolls, verdicts, strict=True):
             whose = f'{placement.name}: ' if len(verdicts) > 1 else ''
@@ -168,11 +178,3 @@ class FilesPanel:
 
     def _show_lines(self, lines: list[Line]) -> None:
         self.message.content = ''.join(colored(text, color) for text, color in lines)
-
-    def _on_upload(self, button: viser.GuiUploadButtonHandle,
-                   action: Callable[[str, bytes], None]) -> None:
-        file = button.value
-        content = file.content
-        # The button keeps its last file: release up to 100 MB.
-        file.content = b''
-        action(file.name, content)

@@ -12,6 +12,7 @@ from ..widgets.bone_tree import BoneTree
 from ..widgets.error_text import error_text
 from ..widgets.form import GREY, RED, CallbackGuard, Form, FormValues, colored
 from .bone_form import BODY, JOINT
+from .scene_folder import MESHES
 from .undo_history import UndoHistory
 
 NONE, NO_BODY = '(no bone)', '(no body)'
@@ -66,6 +67,9 @@ class EditorPanel:
             self.static = gui.add_dropdown('Static body', (NO_BODY,), hint='A wall, a stair')
             self.static_name = gui.add_text('Its name', 'new body')
             self.add_static = gui.add_button('Add a body', icon='cube-plus')
+            self.add_mesh = gui.add_upload_button(
+                'Add a mesh', icon='upload', mime_type=','.join(MESHES), hint='A file '
+                + ', '.join(MESHES) + '; it stands beside the first doll')
             self.remove_static = gui.add_button('Remove this body', icon='trash', visible=False)
         self.parent = ''
         """Bone to which another one is added."""
@@ -78,10 +82,8 @@ class EditorPanel:
             None if self.static.value == NO_BODY else self.static.value))
 
     def show_static(self, scene: Scene, selected: str | None) -> None:
-        """List the first MOST_LISTED static bodies, of which one may be selected; no surfaces or
-        planes, which have no fields.
-        """
-        names = (body.name for body in scene.bodies[:MOST_LISTED] if body.shape.primitives)
+        """List the first MOST_LISTED static bodies, of which one may be selected."""
+        names = (body.name for body in scene.bodies[:MOST_LISTED])
         with self._filling:
             _set_options(self.static, (NO_BODY, *names), selected or NO_BODY)
         self.remove_static.visible = selected is not None

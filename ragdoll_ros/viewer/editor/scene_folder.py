@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING
 
 from ...files import yaml_text
 from ...files.config import config_folder, scene_names
+from ...files.robots.mesh_file import SUFFIXES, read_surface
 from ...files.robots.robot_bodies import PARSERS
 from ...files.scene import load_scene, save_scene, scene_from_data, scene_text
 from ...model import errors
+from ...model.mesh import SURFACES, Mesh
 from ...model.scene import Placement, Scene, all_above_ground
 
 if TYPE_CHECKING:
@@ -27,6 +29,7 @@ LARGEST_UPLOAD = 100_000_000
 
 CHARACTERS = ('.glb', '.gltf', '.vrm', '.urdf')
 DOLLS = ('.yaml', '.yml')
+MESHES = SUFFIXES
 
 ProgressCallback = Callable[[float, str], None]
 """Takes the fraction that is done, and the name of the step."""
@@ -86,7 +89,7 @@ class SceneFolder:
             data = yaml_text.parse(content)
             self._check_dolls(data)
             self._check_models(data)
-            self._check_robots(data)
+            self._check_bodies(data)
             return scene_from_data(data, self.path / name)
         except errors.ModelError as error:
             raise errors.ModelErrors(name, [error]) from None
@@ -121,6 +124,19 @@ class SceneFolder:
         scene = placements[0].name if len(placements) == 1 else Path(name).stem
         return all_above_ground(scene, placements), verdicts
 
+    def mesh(self, name: str, content: bytes) -> Mesh:
+        """The triangles of an uploaded file, which is kept in this folder."""
+        name = safe_name(name)
+        try:
+            _check_size(content)
+            with tempfile.TemporaryDirectory() as inbox:
+                path = Path(inbox, name)
+                path.write_bytes(content)
+                mesh = read_surface(path)
+        except errors.ModelError as error:
+            raise errors.ModelErrors(name, [error]) from None
+        return dataclasses.replace(mesh, source=(str(self._keep(name, content)), mesh.source[1]))
+
     def _check_dolls(self, data: object) -> None:
         """Raise Unreadable for dolls that are neither here nor in config/."""
         for place, source in _dolls_of(data):
@@ -140,9 +156,9 @@ class SceneFolder:
             if isinstance(model, str) and not self._is_inside(model):
                 raise errors.Unreadable('model', model, f'a file inside {self.path}').at(place)
 
-    def _check_robots(self, data: object) -> None:
-        """Raise Unreadable for robots and worlds that are neither here nor in config/."""
-        for place, source in _robots_of(data):
+    def _check_bodies(self, data: object) -> None:
+        """Raise Unreadable for robots, worlds and surfaces that are neither here nor in config/."""
+        for place, source in _files_of_bodies(data):
             is_shipped = source in {path.name for path in config_folder().iterdir()}
             if not is_shipped and not (self._is_inside(source) and (self.path / source).is_file()):
                 raise errors.Unreadable(place, source, f'a file inside {self.path}')
@@ -177,13 +193,19 @@ def _dolls_of(data: object) -> Iterator[tuple[str, object]]:
             yield f'dolls[{index}].doll', entry.get('doll')
 
 
-def _robots_of(data: object) -> Iterator[tuple[str, str]]:
-    """Path and value of each file of a robot in parsed data that may be a scene."""
+def _files_of_bodies(data: object) -> Iterator[tuple[str, str]]:
+    """Path and value of each file of a body in parsed data that may be a scene."""
     bodies = data.get('bodies') if isinstance(data, dict) else None
     for index, entry in enumerate(bodies if isinstance(bodies, list) else ()):
-        for key in PARSERS.keys() & entry.keys() if isinstance(entry, dict) else ():
-            if isinstance(entry[key], str):
-                yield f'bodies[{index}].{key}', entry[key]
+        if not isinstance(entry, dict):
+            continue
+        found = [(key, entry[key]) for key in PARSERS.keys() & entry.keys()]
+        shape = entry.get('shape')
+        for kind in SURFACES.keys() & shape.keys() if isinstance(shape, dict) else ():
+            if isinstance(shape[kind], dict):
+                found += [(f'shape.{kind}.{key}', value) for key, value in shape[kind].items()]
+        yield from ((f'bodies[{index}].{path}', value) for path, value in found
+                    if isinstance(value, str))
 
 
 def safe_name(name: str) -> str:
