@@ -1,5 +1,6 @@
 """~/impacts: a status for each impact while somebody listens, and what /diagnostics tells."""
 import math
+import re
 
 import numpy as np
 import pytest
@@ -70,9 +71,13 @@ def test_impacts_are_published_while_subscribed(make_node, peer):
             assert (status.level == DiagnosticStatus.WARN) == (impact.ratio > 1)
             assert ('hic15' in values) == (impact.region == 'skull')
             assert 'ISO/TS 15066' in values['source_of_limits']
-            worst[impact.region] = max(worst.get(impact.region, 0), impact.ratio)
-    told = (pair.split() for pair in node._impacts.status.split(', '))
-    assert {region: float(ratio) for region, ratio in told} == pytest.approx(worst, rel=0.01)
+            worst[impact.region] = max(worst.get(impact.region, (0, '')),
+                                       (impact.ratio, impact.against))
+    told = {region: (float(ratio), hit) for region, ratio, hit in re.findall(
+        r'(\S+) (\S+) \((.+?)\)', node._impacts.status)}
+    assert told.keys() == worst.keys()
+    for region, (ratio, hit) in told.items():
+        assert (pytest.approx(ratio, rel=0.01), hit) == worst[region]
 
 
 def test_markers_of_impacts_are_arrows_with_their_ratio(make_node, peer):

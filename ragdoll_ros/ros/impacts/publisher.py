@@ -33,8 +33,8 @@ class ImpactPublisher:
         """The simulation whose impacts are recorded."""
         self._refused: Simulation | None = None
         """The simulation whose engine finds none."""
-        self._worst: dict[str, float] = {}
-        """Largest ratio to the limit by region since the start of the run."""
+        self._worst: dict[str, tuple[float, str]] = {}
+        """Largest ratio to the limit, and what was hit, by region since the start of the run."""
         self._run = -1
 
     def configure(self, settings: NodeSettings) -> None:
@@ -83,7 +83,8 @@ class ImpactPublisher:
         self._marker_count += len(impacts)
         for impact in impacts:
             if impact.region:
-                self._worst[impact.region] = max(self._worst.get(impact.region, 0.0), impact.ratio)
+                worst = self._worst.get(impact.region, (0.0, ''))
+                self._worst[impact.region] = max(worst, (impact.ratio, impact.against))
 
     @property
     def status(self) -> str:
@@ -93,5 +94,6 @@ class ImpactPublisher:
                     'there are none; the engine rigid does')
         if self._recorded is None:
             return 'not recorded: nobody subscribes to ~/impacts or its markers'
-        worst = sorted(self._worst.items(), key=lambda item: -item[1])
-        return ', '.join(f'{region} {ratio:.3g}' for region, ratio in worst) or 'none'
+        worst = sorted(self._worst.items(), key=lambda item: -item[1][0])
+        return ', '.join(f'{region} {ratio:.3g} ({against})'
+                         for region, (ratio, against) in worst) or 'none'
