@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Twist, Vector3
+from geometry_msgs.msg import PoseArray, Twist, Vector3
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -257,6 +257,27 @@ dolls:
   - {doll: arm.yaml, name: arm, fixed_root: true, orientation: [0.7071068, 0, 0, 0.7071068],
      motors: {frequency: 1, max_torque: 3}}
 """
+
+
+@pytest.mark.parametrize(('topic', 'moved'), [
+    ('set_joint_states', 'all dolls'), ('pose_target', 'all motors'),
+    ('joint_strengths', 'all motors')])
+def test_joints_do_not_follow_the_nodes_own_joint_states(ros, peer, capfd, topic, moved):
+    node = RagdollNode(cli_args=['--ros-args', '-r', f'~/{topic}:=joint_states'],
+                       parameter_overrides=[Parameter('scene', value='drop'),
+                                            Parameter('start_paused', value=True)])
+    try:
+        assert f'not published, as /joint_states moves {moved}: give' in capfd.readouterr().err
+        poses, heard = (peer.collect(kind, name) for kind, name in (
+            (PoseArray, 'ragdoll/poses'), (JointState, 'joint_states')))
+        peer.wait(lambda: node.count_subscribers('joint_states') > 1)
+        before = len(poses)
+        for _ in range(3):
+            node.tick()
+        peer.wait(lambda: len(poses) >= before + 3)
+        assert not heard and not node.input_counts.refused
+    finally:
+        node.destroy_node()
 
 
 def test_an_arm_on_the_topic_of_joint_states_does_not_follow_itself(ros, peer, tmp_path, capfd):

@@ -341,7 +341,8 @@ class RagdollNode(Node):
         for inputs in (self.inputs, self.states, self.motors):
             inputs.simulation = simulation
         self.bodies.set_simulation(simulation, self.settings)
-        self._outputs.keep_joints_from(self.bodies.moved_by)
+        self._outputs.keep_joints_from({**self.bodies.moved_by, **self.states.moved_by,
+                                        **self.motors.moved_by})
         self._diagnostics.simulation = simulation
         self.inputs.settings = self.states.settings = self.settings
         self.recovery.set_simulation(simulation)

@@ -95,7 +95,7 @@ class Outputs:
         self._description.publish(String(data=prepared.description))
 
     def keep_joints_from(self, moved_by: Mapping[str, Sequence[str]]) -> None:
-        """Publish no joint_states on a topic that moves a robot: it would follow itself.
+        """Publish no joint_states on a topic that moves joints: they would follow themselves.
 
         ``moved_by``: topics by the names of what they move.
         """

@@ -28,9 +28,15 @@ class MotorSubscriptions:
     def __init__(self, node: Node, counts: InputCounts) -> None:
         self._counts = counts
         self.simulation: Simulation
-        node.create_subscription(JointState, TARGET, self.on_pose_target, 10)
         node.create_subscription(Float64, STRENGTH, self.on_strength, 10)
-        node.create_subscription(JointState, STRENGTHS, self.on_joint_strengths, 10)
+        self._joints = [node.create_subscription(JointState, TARGET, self.on_pose_target, 10),
+                        node.create_subscription(JointState, STRENGTHS, self.on_joint_strengths,
+                                                 10)]
+
+    @property
+    def moved_by(self) -> dict[str, list[str]]:
+        """Topics of joint states, as they are remapped, by what they move."""
+        return {'all motors': [each.topic_name for each in self._joints]}
 
     def on_pose_target(self, message: JointState) -> None:
         """Set targets; a message that is wrong is refused and counted, all of it."""

@@ -39,7 +39,12 @@ class StateSubscription:
         self.simulation: Simulation
         self.settings: NodeSettings
         node.create_subscription(Odometry, TOPIC, self.on_odometry, 10)
-        node.create_subscription(JointState, JOINTS, self.on_joint_state, 10)
+        self._joints = node.create_subscription(JointState, JOINTS, self.on_joint_state, 10)
+
+    @property
+    def moved_by(self) -> dict[str, list[str]]:
+        """The topic of joint states, as it is remapped, by what it moves."""
+        return {'all dolls': [self._joints.topic_name]}
 
     def on_odometry(self, message: Odometry) -> None:
         """Set pose and velocities of a doll; a message that is wrong is refused and counted."""
