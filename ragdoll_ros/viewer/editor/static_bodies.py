@@ -103,22 +103,21 @@ def add_body(scene: Scene, name: str) -> Scene:
         raise errors.WrongForm('name', name, 'text without / and control characters')
     if name in _names(scene):
         raise errors.DuplicateName('name', name, 'a unique name')
-    x, y, _ = scene.dolls[0].position
-    place = (x + 2 * NEW_SIZE, y, NEW_SIZE / 2)
+    x, y, floor = _beside_first_doll(scene)
+    place = (x + NEW_SIZE / 2, y, floor + NEW_SIZE / 2)
     return _with_bodies(scene, [*scene.bodies, StaticBody(name, Box((NEW_SIZE,) * 3), place)])
 
 
 def add_mesh(scene: Scene, name: str, mesh: Mesh) -> tuple[Scene, str]:
-    """Add a mesh that stands at the height 0 beside the first doll. Also returns the body's name:
-    ``name``, with a number if it is in use.
+    """Add a mesh that stands beside the first doll. Also returns the body's name: ``name``, with a
+    number if it is in use.
     """
     taken, free = _names(scene), name
     number = 2
     while free in taken:
         free, number = f'{name}_{number}', number + 1
     lower, upper = mesh.bounds
-    x, y, _ = scene.dolls[0].position
-    place = np.array((x + 1.5 * NEW_SIZE, y, 0.0)) - (lower[0], (lower[1] + upper[1]) / 2, lower[2])
+    place = _beside_first_doll(scene) - (lower[0], (lower[1] + upper[1]) / 2, lower[2])
     return _with_bodies(scene, [*scene.bodies, StaticBody(free, mesh, vector(place))]), free
 
 
@@ -126,6 +125,12 @@ def remove_body(scene: Scene, name: str) -> Scene:
     """Remove a body."""
     body = find(scene, name)
     return _with_bodies(scene, [each for each in scene.bodies if each is not body])
+
+
+def _beside_first_doll(scene: Scene) -> np.ndarray:
+    """Where a new body begins and stands (3,) m: on the level ground, else at the doll's height."""
+    x, y, z = scene.dolls[0].position
+    return np.array((x + 1.5 * NEW_SIZE, y, z if scene.ground is None else 0.0))
 
 
 def _names(scene: Scene) -> set[str]:
