@@ -299,3 +299,19 @@ def test_what_is_wrong_with_a_body_is_named(tmp_path, entry, told):
     with pytest.raises(ValueError) as error:
         load_scene(str(file))
     assert told in str(error.value)
+
+
+@pytest.mark.parametrize(('dolls', 'bodies', 'place'), [
+    ('{doll: doll, repeat: {count: 3}}, {doll: doll, name: a}, {doll: doll, name: a}', '',
+     'dolls[2].name'),
+    ('{doll: doll, repeat: {count: 3}}', '{name: a, shape: {box: {size: [1, 1, 1]}}, repeat: '
+     '{count: 4}}, {name: b, shape: {sphere: {radius: 1}}}, {name: a_3, shape: {sphere: {radius: '
+     '1}}}', 'bodies[2].name'),
+    ('{doll: doll, repeat: {count: 3}}', '{name: a, mass: 1, shape: {sphere: {radius: 1}}, repeat: '
+     '{count: 2}}, {name: doll_2, mass: 1, shape: {sphere: {radius: 1}}}', 'bodies[1].name')])
+def test_a_name_in_use_is_told_at_its_entry(tmp_path, dolls, bodies, place):
+    file = tmp_path / 'scene.yaml'
+    file.write_text(f'dolls: [{dolls}]\nbodies: [{bodies}]\n')
+    with pytest.raises(ValueError, match='a unique name') as error:
+        load_scene(str(file))
+    assert f'{place}:' in str(error.value)

@@ -39,13 +39,16 @@ class SceneBodies(NamedTuple):
     """All others, as dolls of one bone."""
     robots: list[Robot]
     """What moves some of them."""
+    static_entries: list[str]
+    """Of each static body, the path of its entry: bodies[0]."""
+    loose_entries: list[str]
 
 
 def build_bodies(data: dict, folder: Path, found: list[ModelError]) -> SceneBodies:
     """The bodies of a scene's data. Appends every error to ``found``. Paths are relative to
     ``folder``.
     """
-    static, loose, robots = bodies = SceneBodies([], [], [])
+    static, loose, robots, *_ = bodies = SceneBodies([], [], [], [], [])
     for index, entry in enumerate(entries(data, 'bodies')):
         where = f'bodies[{index}]'
         if has_error_under(found, where):
@@ -63,6 +66,8 @@ def build_bodies(data: dict, folder: Path, found: list[ModelError]) -> SceneBodi
             loose += _copies(try_build(found, where, _loose_body, entry), entry)
         else:
             static += _copies(try_build(found, where, _static_body, entry, folder), entry)
+        for made, made_by in ((static, bodies.static_entries), (loose, bodies.loose_entries)):
+            made_by += [where] * (len(made) - len(made_by))
         if len(static) + len(loose) > MOST_BODIES:
             found.append(OutOfRange(where, len(static) + len(loose),
                                     f'at most {MOST_BODIES} bodies in all'))

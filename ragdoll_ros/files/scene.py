@@ -98,6 +98,8 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
     if not is_marked(data, 'scene'):
         return None, found
     placements: list[Any] = []
+    made_by: list[str] = []
+    """Of each placement, the path of its entry."""
     entries = data.get('dolls')
     # A doll that many entries share, by name or by alias, is built once.
     named = functools.cache(lambda name: _named_doll(name, path))
@@ -119,6 +121,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
             found += [error.at(where) for error in more]
         if doll is not None and not has_error_under(found, where):
             placements += try_build(found, where, _copies, doll, entry, path.parent) or []
+            made_by += [where] * (len(placements) - len(made_by))
         if len(placements) > MOST_DOLLS:
             found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
             break
@@ -138,7 +141,16 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
              if key in data}
     scene = try_build(found, '', Scene, data.get('name', path.stem), tuple(placements),
                       **parts, **plain)
-    return scene, found
+    made = {'dolls': made_by + bodies.loose_entries, 'bodies': bodies.static_entries}
+    return scene, [_at_entry(error, made) for error in found]
+
+
+def _at_entry(error: ModelError, made_by: dict[str, list[str]]) -> ModelError:
+    """The error of a name, at the entry that made what has it: `repeat` makes many of one."""
+    place = re.fullmatch(r'(dolls|bodies)\[(\d+)\]\.name', error.path)
+    if place is None:
+        return error
+    return type(error)(f'{made_by[place[1]][int(place[2])]}.name', error.value, error.expected)
 
 
 def scene_data(scene: Scene, folder: Path | None = None,
