@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from falls_recipes import DROP, SHOVE, recipe
+from falls_recipes import DROP, SHOVE, file_bytes, recipe
 
 from ragdoll_ros import load_doll
 from ragdoll_ros.falls import generate, load_recipe
@@ -180,6 +180,42 @@ def test_a_fall_has_the_codes_of_its_cause_and_direction(pandas, cause):
     names = pandas.read_csv(io.BytesIO(sisfall['labels/SA000007.csv']))['file']
     assert [int(name[1:3]) for name in names] == CODES[cause][1] * 2
     assert {f'SisFall_dataset/SA000007/{name}' for name in names} < set(sisfall)
+
+
+def test_what_has_no_impact_is_no_task_of_a_fall(pandas, shoved):
+    """Readers take KFall's tasks 20 to 34, and SisFall's names with F, for falls."""
+    made = recipe({**SHOVE, 'pushes': [], 'duration': 0.2, 'record': {
+        'imu_rate': 200, 'imus': [IMU]}})
+    stands = list(generate(made, range(2)))
+    assert all(fall.phases.impact is None for fall in stands)
+    kfall, sisfall = (resolve_format(name).shard_files(made, stands, 0)
+                      for name in ('kfall', 'sisfall'))
+    assert 'sensor_data/SA000000/S000000T00R02.csv' in kfall
+    assert 'SisFall_dataset/SA000000/D00_SA000000_R02.txt' in sisfall
+    labels = pandas.read_csv(io.BytesIO(kfall['label_data/SA000000_label.csv']))
+    assert list(labels['Task Code (Task ID)']) == ['D00 (0)'] * 2
+    assert set(labels['Description']) == {'no fall'} and labels['Fall_impact_frame'].isna().all()
+
+
+def test_formats_of_one_run_are_the_bytes_of_each(tmp_path, shoved):
+    """Several formats at once simulate once and hold what each alone holds."""
+    names = ['lerobot', 'kfall', 'amass']
+    for name in [*names, ','.join(names)]:
+        build_dataset(DatasetJob(shoved[0], 2, name), tmp_path / name, here)
+    together = file_bytes(tmp_path / ','.join(names))
+    alone = {path: content for name in names
+             for path, content in file_bytes(tmp_path / name).items()}
+    assert set(alone) == set(together)
+    assert [path for path in alone if alone[path] != together[path]] == ['manifest.jsonl']
+    assert main(['describe', str(tmp_path / ','.join(names))]) == 0
+
+
+@pytest.mark.parametrize('given', ['xml', 'lerobot,', 'kfall,mp4'])
+def test_an_unknown_format_is_named(tmp_path, given, capsys):
+    with pytest.raises(SystemExit):
+        main(['shove', '-o', str(tmp_path), '--format', given])
+    said = capsys.readouterr().err
+    assert repr(given.split(',')[-1]) in said and 'lerobot, kfall' in said
 
 
 def test_sisfall_by_numpy(pandas, tmp_path):

@@ -22,6 +22,7 @@ EXAMPLE = """examples:
   ragdoll_falls shove -o falls --count 1000 --resume    continue an interrupted run
   ragdoll_falls describe falls                    a page and pictures about the data set
   ragdoll_falls mine.yaml -o csv --format kfall   one CSV file per fall
+  ragdoll_falls mine.yaml -o all --format lerobot,kfall    several formats of the same falls
 """
 
 
@@ -72,7 +73,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('-o', '--out', type=Path, required=True, metavar='FOLDER',
                         help='output folder of the data set')
     parser.add_argument('--count', type=int, default=100, help='number of falls (%(default)s)')
-    parser.add_argument('--format', choices=FORMATS, default='lerobot', help='; '.join(
+    parser.add_argument('--format', type=formats, default='lerobot', metavar='FORMAT[,FORMAT]',
+                        help='one format or several of the same falls: ' + '; '.join(
         f'{name}: {about}' for name, about in FORMATS.items()) + ' (%(default)s)')
     parser.add_argument('--settled', dest='format', action='store_const', const='settled',
                         help='the same as --format settled')
@@ -83,6 +85,16 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--resume', action='store_true',
                         help='keep the complete shards in the folder, make the rest')
     return parser
+
+
+def formats(text: str) -> str:
+    """Parse names of formats: each once, in the order of FORMATS."""
+    given = text.split(',')
+    if unknown := [name for name in given if name not in FORMATS]:
+        raise argparse.ArgumentTypeError(
+            f'{", ".join(map(repr, unknown))}: expected names separated by commas, of '
+            + ', '.join(FORMATS))
+    return ','.join(name for name in FORMATS if name in given)
 
 
 def workers(text: str) -> int:

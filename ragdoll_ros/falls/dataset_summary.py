@@ -80,7 +80,7 @@ class DatasetSummary:
 def summarize(folder: Path) -> DatasetSummary:
     """Read the labels of a data set; Unreadable or WrongForm if it has none that can be read."""
     manifest = Manifest.read(folder)
-    if manifest.header['format'] != 'lerobot':
+    if 'lerobot' not in manifest.header['format'].split(','):
         raise WrongForm('format', manifest.header['format'], 'lerobot, to be described')
     if manifest.done < manifest.header['count']:
         raise WrongForm('falls', manifest.done, f'all {manifest.header["count"]}: ragdoll_falls '

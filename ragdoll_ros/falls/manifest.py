@@ -13,7 +13,6 @@ from pathlib import Path
 
 from ..files.run_scene import versions
 from ..model.errors import Unreadable
-from .formats.registry import resolve_format
 from .shard import FALLS_PER_SHARD, DatasetJob, Shard
 
 FILE = 'manifest.jsonl'
@@ -194,7 +193,8 @@ def build_dataset(job: DatasetJob, folder: Path, make: ShardMaker, resume: bool 
             on_progress(manifest, len(shard.falls))
     finally:
         getattr(shards, 'close', lambda: None)()
-    last_files = getattr(resolve_format(job.format), 'last_files', lambda *_: {})
-    write_files(folder, last_files(job.recipe, job.count, folder))
+    for each in job.formats:
+        last_files = getattr(each, 'last_files', lambda *_: {})
+        write_files(folder, last_files(job.recipe, job.count, folder))
     manifest.write_sorted()
     return manifest

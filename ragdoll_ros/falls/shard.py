@@ -6,7 +6,7 @@ every order.
 from dataclasses import dataclass
 
 from ..model.errors import OutOfRange
-from .formats.registry import resolve_format
+from .formats.registry import Format, resolve_format
 from .recipe import Recipe
 from .simulate import generate
 
@@ -18,7 +18,9 @@ MAX_FALLS = 10 ** 9
 
 @dataclass(frozen=True)
 class DatasetJob:
-    """A data set to be generated: falls 0 to ``count`` - 1 of a recipe, in a format."""
+    """A data set to be generated: falls 0 to ``count`` - 1 of a recipe, in one format or several,
+    whose names are separated by commas.
+    """
 
     recipe: Recipe
     count: int
@@ -27,7 +29,13 @@ class DatasetJob:
     def __post_init__(self) -> None:
         if not 1 <= self.count <= MAX_FALLS:
             raise OutOfRange('count', self.count, f'1 to {MAX_FALLS}')
-        getattr(resolve_format(self.format), 'check', lambda recipe: None)(self.recipe)
+        for each in self.formats:
+            getattr(each, 'check', lambda recipe: None)(self.recipe)
+
+    @property
+    def formats(self) -> list[Format]:
+        """Modules of the formats."""
+        return [resolve_format(name) for name in self.format.split(',')]
 
     @property
     def shards(self) -> int:
@@ -54,6 +62,7 @@ class Shard:
 def make_shard(job: DatasetJob, shard: int) -> Shard:
     """Simulate the falls of a shard and encode them as files."""
     falls = list(generate(job.recipe, job.falls_of(shard)))
-    files = resolve_format(job.format).shard_files(job.recipe, falls, shard)
+    files = {name: content for each in job.formats
+             for name, content in each.shard_files(job.recipe, falls, shard).items()}
     failures = {fall.number: fall.failure for fall in falls if fall.failure}
     return Shard(shard, job.falls_of(shard), files, failures)

@@ -24,6 +24,9 @@ SENSOR = 'sensor_data/SA{shard:06d}/S{shard:06d}T{task:02d}R{trial:02d}.csv'
 LABELS = 'label_data/SA{shard:06d}_label.csv'
 COLUMNS = ('TimeStamp(s)', 'FrameCounter', 'AccX', 'AccY', 'AccZ', 'GyrX', 'GyrY', 'GyrZ',
            'EulerX', 'EulerY', 'EulerZ')
+FALLS_FROM = 19
+"""Task of the fall F01, less one."""
+
 LABEL_COLUMNS = ('Task Code (Task ID)', 'Description', 'Trial ID', 'Fall_onset_frame',
                  'Fall_impact_frame', 'Fall', 'Failure')
 
@@ -43,7 +46,8 @@ def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, byte
         trial = trials[task.kfall]
         files[SENSOR.format(shard=shard, task=task.kfall, trial=trial)] = table(
             COLUMNS, _rows(recipe, fall))
-        labels.append((f'F{task.kfall - 19:02d} ({task.kfall})', description_of(recipe, task),
+        code = task.kfall - FALLS_FROM if task.kfall else 0
+        labels.append((f'{task.letter}{code:02d} ({task.kfall})', description_of(recipe, task),
                        trial, *('' if frame is None else frame * fall.samples_per_frame
                                 for frame in (fall.phases.onset, fall.phases.impact)),
                        fall.number, fall.failure))

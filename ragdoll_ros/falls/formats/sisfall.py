@@ -21,7 +21,7 @@ RATE = 200
 """Samples per second of SisFall; its files have no times."""
 
 FOLDER = 'SisFall_dataset/SA{shard:06d}'
-NAME = 'F{code:02d}_SA{shard:06d}_R{trial:02d}.txt'
+NAME = '{letter}{code:02d}_SA{shard:06d}_R{trial:02d}.txt'
 LABELS = 'labels/SA{shard:06d}.csv'
 LABEL_COLUMNS = ('file', 'description', 'onset_sample', 'impact_sample', 'fall', 'failure')
 
@@ -44,7 +44,8 @@ def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, byte
     for fall in falls:
         task = task_of(recipe, fall)
         trials[task.sisfall] += 1
-        name = NAME.format(code=task.sisfall, shard=shard, trial=trials[task.sisfall])
+        name = NAME.format(letter=task.letter, code=task.sisfall, shard=shard,
+                           trial=trials[task.sisfall])
         files[f'{FOLDER.format(shard=shard)}/{name}'] = _lines(fall)
         labels.append((name, description_of(recipe, task), *(
             '' if frame is None else frame * fall.samples_per_frame

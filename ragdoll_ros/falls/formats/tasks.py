@@ -4,7 +4,6 @@ KFall: Yu, Jang, Xiong 2021 (10.3389/fnagi.2021.692865), tasks 20 to 34 are fall
 1 to 19, 35 and 36 are activities. SisFall: Sucerquia, Lopez, Vargas-Bonilla 2017
 (10.3390/s17010198), F01 to F15.
 """
-import math
 from dataclasses import dataclass
 
 from ..fall import Fall
@@ -21,11 +20,19 @@ class TaskCode:
     sisfall: int
     description: str
 
+    @property
+    def letter(self) -> str:
+        """F of falls, D of what is none."""
+        return 'F' if self.sisfall else 'D'
+
 
 _TRIP = TaskCode(30, 4, 'Forward fall while walking caused by a trip')
 _SLIPS = (TaskCode(32, 1, 'Forward fall while walking caused by a slip'),
           TaskCode(33, 3, 'Lateral fall while walking caused by a slip'),
           TaskCode(34, 2, 'Backward fall while walking caused by a slip'))
+
+NO_FALL = TaskCode(0, 0, 'no fall')
+"""Of what has no impact: a code that neither data set has, and that no reader takes for a fall."""
 
 CAUSES = {
     'faint': (TaskCode(28, 6, 'Vertical (forward) fall while walking caused by fainting'),) * 3,
@@ -41,11 +48,14 @@ _SIDES = (FORWARDS, LATERAL, BACKWARDS, LATERAL)
 
 
 def task_of(recipe: Recipe, fall: Fall) -> TaskCode:
-    """Code of a fall; of one without an impact that of a fall forwards."""
-    quarter = 0 if math.isnan(fall.direction) else round(fall.direction / 90) % 4
+    """Code of a fall, NO_FALL without an impact."""
+    if fall.phases.impact is None:
+        return NO_FALL
+    quarter = round(fall.direction / 90) % 4
     return CAUSES[recipe.data.get('cause')][_SIDES[quarter]]
 
 
 def description_of(recipe: Recipe, task: TaskCode) -> str:
     """What a fall is: KFall's description of it, or that it has none."""
-    return task.description if 'cause' in recipe.data else f'{recipe.name}: no task of KFall'
+    known = 'cause' in recipe.data or task is NO_FALL
+    return task.description if known else f'{recipe.name}: no task of KFall'
