@@ -23,7 +23,7 @@ RANGES = {
     'start.clearance': (0, 100), 'start.velocity': (-100, 100), 'start.spin': (-100, 100),
     'start.other_angles': (0, 1), 'pushes.force': (0, 1e5), 'pushes.towards_deg': TURN,
     'start.walk.speed': (0.1, 3), 'limp.at': (0, 600), 'grabs.at': (0, 600),
-    'grabs.duration': (1e-3, 600),
+    'grabs.duration': (1e-3, 600), 'grabs.to': (-100, 100), 'grabs.takes': (1e-3, 600),
     'pushes.upwards_deg': (-90, 90), 'pushes.at': (0, 600), 'pushes.duration': (1e-3, 600),
     'ground.friction': (0, math.inf), 'ground.friction_under.*': (0, 100),
     'ground.restitution': (0, 1), 'ground.slope_deg': (0, 45),
@@ -105,9 +105,19 @@ def _wrong_limp(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _wrong_walk(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """`walk` of dolls, or beside another motion at the start."""
+    """`walk` or `level_soles` of dolls, or beside what they determine."""
     start, who = data.get('start'), data.get('who')
-    if has_error_under(found, 'start') or not isinstance(start, dict) or 'walk' not in start:
+    if has_error_under(found, 'start') or not isinstance(start, dict):
+        return
+    if start.get('level_soles'):
+        if isinstance(who, dict) and 'people' not in who:
+            yield errors.WrongForm('start.level_soles', 'dolls', 'people: only they have ankles')
+        for name in start.get('angles_deg', {}):
+            stance = name[:1] != start.get('walk', {}).get('swing', '')[:1]
+            if name.endswith('_ankle') and stance:
+                yield errors.WrongForm(f'start.angles_deg.{name}', start['angles_deg'][name],
+                                       'none beside level_soles')
+    if 'walk' not in start:
         return
     if isinstance(who, dict) and 'people' not in who:
         yield errors.WrongForm('start.walk', 'dolls', 'people: only they can walk')

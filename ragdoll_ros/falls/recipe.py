@@ -57,6 +57,11 @@ class Recipe:
     """Bodies beside the doll, their x axis along its heading."""
 
     @property
+    def falls(self) -> bool:
+        """Whether what happens is a fall: phases are looked for."""
+        return self.data.get('cause') != 'no_fall'
+
+    @property
     def floor(self) -> list[str]:
         """Names of the bodies that count as ground."""
         return self.data.get('floor', [])

@@ -10,7 +10,7 @@ from ..files.limits import load_limits
 from ..model.biomechanical_limits import BiomechanicalLimits
 from ..model.coordinates import GeneralizedState
 from ..model.errors import RagdollError
-from ..model.scene import Scene
+from ..model.scene import SECOND, Scene
 from ..people import standing
 from ..people.fall_phases import ONSET_DURATION, Phases, find_phases
 from ..people.passive import end_widths
@@ -52,6 +52,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
         simulation.samples_per_tick = recipe.samples_per_frame
         simulation.record_impacts(limits)
         guard, events = Guard(simulation), _events(simulation, start)
+        hands = _MovingHands(simulation, start)
         while frames.valid < recipe.frames and not failure:
             frames.add(simulation)
             if simulation.asleep and simulation.time > start.last_event:
@@ -59,6 +60,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
             elif frames.valid < recipe.frames:
                 while events and events[0][0] <= simulation.time:
                     events.pop(0)[1]()
+                hands.move()
                 bad = guard.advance()
                 failure = bad.reason if bad else ''
                 if not bad:
@@ -69,7 +71,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
         scene, states, touching, recipe.data['feet'], round(ONSET_DURATION * recipe.rate),
-        **recipe.data['phases']) if frames.valid else Phases()
+        **recipe.data['phases']) if frames.valid and recipe.falls else Phases()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
@@ -126,6 +128,25 @@ def _events(simulation: Simulation, start: Start) -> list[tuple[int, Callable[[]
         events += [(grab.at, partial(simulation.grab, hand, grab.bone)),
                    (grab.until, partial(simulation.let_go, hand))]
     return sorted(events, key=lambda event: event[0])
+
+
+class _MovingHands:
+    """Moves the hands of a start's ``grabs`` that go somewhere, tick by tick."""
+
+    def __init__(self, simulation: Simulation, start: Start) -> None:
+        self._simulation, self._starts = simulation, {}
+        self._moving = {f'hand {index}': grab for index, grab in enumerate(start.grabs) if grab.to}
+
+    def move(self) -> None:
+        """Drag each hand that holds something to where it is at the end of the next tick."""
+        if not self._moving:
+            return
+        step = self._simulation.step
+        for held in self._simulation.grabs:
+            if grab := self._moving.get(held.hand):
+                start = self._starts.setdefault(held.hand, np.array(held.target))
+                end = self._simulation.time + round(step * SECOND)
+                self._simulation.drag(held.hand, grab.place(start, end), step)
 
 
 class _Recorder:

@@ -6,13 +6,14 @@ import numpy as np
 
 from ..model import rotation
 from ..model.coordinates import DofLayout, GeneralizedState
+from ..model.forward_kinematics import bone_motions
 from ..model.push import Push
 from ..model.ragdoll import Ragdoll
 from ..model.rotation import sine_and_cosine
 from ..model.scene import SECOND, Ground, Material, Placement, Scene
 from .bodies import turned
 from .recipe import Recipe
-from .walking import gait
+from .walking import SIDES, gait
 
 GRAVITY = (0.0, 0.0, -9.8)
 
@@ -27,11 +28,22 @@ class JointRelease:
 
 @dataclass(frozen=True)
 class BoneHold:
-    """A ``bone`` whose centre of mass a hand holds where it is, from ``at`` to ``until``, ns."""
+    """A ``bone`` whose centre of mass a hand holds from ``at`` to ``until``, ns: where it is, or on
+    the way to a point, with minimum jerk (Flash and Hogan 1985, J Neurosci 5:1688).
+    """
 
     at: int
     until: int
     bone: str
+    to: tuple[float, float, float] | None = None
+    """Where the hand moves, m, world frame; None: nowhere."""
+    takes: int = 1
+    """Duration of that movement, ns."""
+
+    def place(self, start: np.ndarray, time: int) -> np.ndarray:
+        """Where the hand is, (3,) m, that was at ``start`` (3,) when it grabbed."""
+        share = min(max((time - self.at) / self.takes, 0.0), 1.0)
+        return start + share ** 3 * (10 - 15 * share + 6 * share ** 2) * (np.array(self.to) - start)
 
 
 @dataclass(frozen=True)
@@ -81,6 +93,8 @@ def start_of(recipe: Recipe, number: int) -> Start:
                           velocity=tuple(rotation.rotate(faced, start['velocity'])),
                           spin=tuple(rotation.rotate(faced, start['spin'])))
     angles = _angles(doll, start)
+    if start.get('level_soles'):
+        angles.update(_ankles(doll, angles, lean, start.get('walk', {}).get('swing')))
     if 'walk' in start:
         step = gait(doll, angles, **start['walk'])
         placement = replace(placement, angles=angles, rates=step.rates,
@@ -93,9 +107,7 @@ def start_of(recipe: Recipe, number: int) -> Start:
                  tuple(_push(push, heading) for push in drawn['pushes']),
                  tuple(sorted((JointRelease(round(each['at'] * SECOND), each.get('angles'))
                                for each in drawn['limp']), key=lambda limp: limp.at)),
-                 tuple(BoneHold(round(grab['at'] * SECOND),
-                                round((grab['at'] + grab['duration']) * SECOND), grab['bone'])
-                       for grab in drawn.get('grabs', ())))
+                 tuple(_hold(grab, heading) for grab in drawn.get('grabs', ())))
 
 
 def _uniform_orientation(first: float, second: float, third: float) -> np.ndarray:
@@ -134,6 +146,31 @@ def _angles(doll: Ragdoll, start: dict) -> dict[str, float]:
     angles = {name: limits[name][0] + share * (limits[name][1] - limits[name][0])
               for name, share in start['angle_shares'].items()}
     return {**angles, **{name: math.radians(angle) for name, angle in start['angles_deg'].items()}}
+
+
+def _ankles(doll: Ragdoll, angles: dict[str, float], lean: np.ndarray,
+            swing: str | None) -> dict[str, float]:
+    """Angles of a person's ankles, rad, but of the leg that swings, at which the soles are level
+    while the root has the orientation ``lean``; within the ranges of the ankles.
+    """
+    limits = {name: pair for joint in doll.joints
+              for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+    motions, found = bone_motions(doll, angles, {}), {}
+    for side in set(SIDES) - {swing}:
+        shin = rotation.multiply(lean, motions[f'{side}_shin'].turn)
+        # The vertical in the shin's axes, which pitch, then roll, must make the foot's z axis.
+        x, y, z = rotation.rotate(rotation.inverse(shin), (0.0, 0.0, 1.0)).tolist()
+        for axis, angle in (('p', math.atan2(x, z)), ('r', -math.asin(y))):
+            name = f'{SIDES[side]}_{axis}_ankle'
+            found[name] = min(max(angle, limits[name][0]), limits[name][1])
+    return found
+
+
+def _hold(drawn: dict, heading: np.ndarray) -> BoneHold:
+    at, duration = drawn['at'], drawn['duration']
+    to = tuple(rotation.rotate(heading, drawn['to']).tolist()) if 'to' in drawn else None
+    return BoneHold(round(at * SECOND), round((at + duration) * SECOND), drawn['bone'], to,
+                    round(drawn.get('takes', duration) * SECOND))
 
 
 def _push(drawn: dict, heading: np.ndarray) -> Push:
