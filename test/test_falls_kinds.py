@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from falls_recipes import BALL, DROP, recipe
+from scipy.spatial.transform import Rotation
 
 from ragdoll_ros.falls import generate, load_recipe
 from ragdoll_ros.falls.recipe import build_recipe, recipe_of
@@ -49,6 +50,56 @@ def test_a_grabbed_bone_is_held_as_by_a_damped_spring_and_let_go():
     # Steps of at most 0.25 ms, of order 2: (w h)^2 of the speed.
     np.testing.assert_allclose(fall.states[:, 0, 7], expected, atol=0.5 * (30 * 0.00025) ** 2)
     assert fall.scene.angle_names == () and not fall.failure
+
+
+@pytest.mark.parametrize('heading', [0, 90])
+def test_a_hand_moves_a_ball_with_minimum_jerk_to_where_it_says(heading):
+    fall = next(generate(recipe(
+        start={'clearance': 0.9, 'heading_deg': heading}, duration=2, record={'rate': 100},
+        grabs=[{'bone': 'ball', 'at': 0.2, 'duration': 9, 'to': [0.4, 0, 1.5], 'takes': 1}]), [0]))
+    along, up = fall.states[:, 0, 0 if heading == 0 else 1], fall.states[:, 0, 2]
+    # Flash and Hogan 1985. A damped spring of w = 30 rad/s is up to a/w^2 behind its hand, whose
+    # acceleration is at most 5.8 d/T^2, and ends g/w^2 below it.
+    share = np.clip(fall.times - 0.2, 0, 1)
+    expected = 0.4 * (10 * share ** 3 - 15 * share ** 4 + 6 * share ** 5)
+    np.testing.assert_allclose(along, expected, atol=5.8 * 0.4 / 30 ** 2)
+    assert along[-1] == pytest.approx(0.4, abs=1e-3)
+    assert up[-1] == pytest.approx(1.5 - 9.8 / 30 ** 2, abs=1e-3)
+
+
+def test_who_is_lowered_does_not_fall():
+    """A ball that is put down touches the ground and is no fall."""
+    put_down = {'start': {'clearance': 0.3}, 'duration': 1.5, 'record': {'rate': 100},
+                'grabs': [{'bone': 'ball', 'duration': 9, 'to': [0, 0, 0.05], 'takes': 1}]}
+    for cause, falls in (({'cause': 'no_fall'}, False), ({}, True)):
+        fall = next(generate(recipe(**put_down, **cause), [0]))
+        assert fall.touching[:, 0].any() and (fall.phases.impact is not None) == falls
+
+
+@pytest.mark.parametrize('walks', [False, True])
+def test_soles_are_level_whatever_the_lean(walks):
+    start = {'heading_deg': 40, 'lean_deg': 11, 'lean_towards_deg': 230, 'level_soles': True,
+             'angles_deg': {'l_p_hip': -12, 'l_knee': 9, 'r_p_hip': -30, 'r_knee': 3}}
+    if walks:
+        start |= {'lean_deg': 5, 'walk': {'speed': 1, 'swing': 'right'}}
+    fall = next(generate(recipe({**WALK, 'start': start}), [0]))
+    feet = [Rotation.from_quat(fall.states[0, fall.scene.bone_index(f'{side}_foot'), 3:7])
+            for side in ('left', 'right')]
+    tilts = [math.degrees(math.acos(min(foot.apply([0, 0, 1])[2], 1))) for foot in feet]
+    # To the cosine's rounding: sqrt(2 eps) rad.
+    assert tilts[0] == pytest.approx(0, abs=1e-5) and (tilts[1] > 5 if walks else tilts[1] < 1e-5)
+
+
+def test_level_soles_set_the_ankles_of_people():
+    start = {'level_soles': True, 'angles_deg': {'l_p_ankle': 5, 'r_p_ankle': 5}}
+    _, found = build_recipe({**DROP, 'start': {'level_soles': True}}, Path('recipe.yaml'))
+    assert [error.path for error in found] == ['start.level_soles']
+    _, found = build_recipe({**WALK, 'start': start}, Path('recipe.yaml'))
+    assert [error.path for error in found] == [
+        'start.angles_deg.l_p_ankle', 'start.angles_deg.r_p_ankle']
+    start['walk'] = {'speed': 1, 'swing': 'right'}
+    _, found = build_recipe({**WALK, 'start': start}, Path('recipe.yaml'))
+    assert [error.path for error in found] == ['start.angles_deg.l_p_ankle']
 
 
 def test_friction_may_be_less_under_one_bone():
@@ -112,7 +163,7 @@ def test_wrong_kinds_are_refused_with_all_errors():
 
 def test_recipes_without_these_keys_have_the_falls_that_they_had():
     data = copy.deepcopy(load_recipe('shove').data)
-    assert data['record']['imus'][0].pop('contact_pulse')
+    assert data['record']['imus'][0].pop('contact_pulse') and data['start'].pop('level_soles')
     assert recipe_of(data).digest.startswith(SHOVE_DIGEST)
     assert f'{load_recipe("tumble").philox_key:032x}' == TUMBLE_KEY
 
