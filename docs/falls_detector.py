@@ -2,9 +2,9 @@
 
 python docs/falls_detector.py --train faint shove sit_down --test trip slip chair lie_down
 
-Each folder is a data set that `ragdoll_falls` wrote in the format lerobot, read with pandas alone. A
-random forest classifies windows of 0.5 s of the sensor low_back; those that end within 0.3 s after
-an impact are falls. Needs scikit-learn.
+Each folder is a data set that `ragdoll_falls` wrote in the format lerobot, read with pandas alone.
+A random forest classifies windows of 0.5 s of the sensor low_back; those that end within 0.3 s
+after an impact are falls. Needs scikit-learn.
 """
 from __future__ import annotations
 

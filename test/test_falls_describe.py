@@ -113,12 +113,13 @@ def test_a_peak_is_as_high_and_wide_as_it_is():
         forces.append(np.stack([0 * time, pulse, 0 * time], axis=1))
     forces[1][100:103] = [0, 0, -7 * 9.80665]
     peaks = Peaks.of({'name': 'a', 'bone': 'b'}, [*forces, np.full((9, 3), np.nan)],
-                     np.array([0.47, 0.48, 0.1]), 0.001)
+                     np.array([0.47, 0.48, 0.1]), np.array([np.nan, 0.501, 0.1]), 0.001)
     np.testing.assert_allclose(peaks.largest, [50 / 9.80665, 200 / 9.80665, np.nan])
     # A half-sine is above half its height for two thirds of its width; to a sample at each end.
     np.testing.assert_allclose(peaks.widths, [0.04, 0.02, np.nan], atol=0.002)
     np.testing.assert_allclose(peaks.before_impact, [1, 7, np.nan])
-    assert peaks.share_early == 0.5
+    np.testing.assert_allclose(peaks.before_pelvis, [np.nan, 200 / 9.80665, np.nan])
+    assert peaks.shares_early == (0.5, 1.0)
 
 
 def test_describe_prints_directions_and_peaks_and_warns_beyond_published_ranges(
@@ -138,7 +139,7 @@ def test_describe_prints_directions_and_peaks_and_warns_beyond_published_ranges(
     # The torso drops by half a metre and more.
     warned = [line for line in errors.splitlines() if line.startswith('warning: ')]
     peak, = (line for line in warned if 'peak acceleration' in line)
-    assert f'{middle:.1f}; real falls: 3 to 8 (' in peak and middle > 8
+    assert f'{middle:.1f}; real falls: 3.8 to 8.1 (' in peak and middle > 8.1
     page = (tmp_path / 'README.md').read_text()
     assert page.count('| **outside** |') == len(warned)
 

@@ -42,7 +42,11 @@ class PublishedComparison:
 
 
 def comparisons(summary: DatasetSummary) -> Iterator[PublishedComparison]:
-    """All that can be compared; nothing for body parts that the doll lacks."""
+    """All that can be compared; nothing for body parts that the doll lacks, or where nobody is
+    meant to fall.
+    """
+    if not summary.recipe.falls:
+        return
     yield from _spread('descent, s', 'pelvis', summary, summary.descents, DESCENT)
     for part, known in IMPACT_SPEEDS.items():
         yield from _spread(f'impact speed of the {part}, m/s', part, summary,

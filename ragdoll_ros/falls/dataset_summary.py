@@ -90,13 +90,14 @@ def summarize(folder: Path) -> DatasetSummary:
     labels = lerobot.read_labels(folder)
     onsets, impacts, rests, impact_times = (
         labels[key] / recipe.rate for key in ('onset', 'impact', 'rest', 'impact_frames'))
-    peaks = Peaks()
+    bones, peaks = [bone.name for bone in recipe.dolls[0].bones], Peaks()
     if recipe.imus:
         samples = lerobot.read_forces(folder, recipe, recipe.imus[0]['name'])
-        peaks = Peaks.of(recipe.imus[0], samples, impacts,
+        pelvis, _ = part_impact('pelvis', bones, impact_times, labels['impact_speeds'])
+        peaks = Peaks.of(recipe.imus[0], samples, impacts, pelvis,
                          1 / (recipe.rate * recipe.samples_per_frame))
     return DatasetSummary(
-        recipe, [bone.name for bone in recipe.dolls[0].bones], onsets, impacts, rests,
+        recipe, bones, onsets, impacts, rests,
         labels['direction_deg'], impact_times, labels['impact_speeds'], manifest.failures,
         lerobot.read_regions(folder), labels['region_peak_forces_N'], labels['region_ratios'],
         labels['hic15'], peaks)

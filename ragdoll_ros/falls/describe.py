@@ -90,7 +90,8 @@ def _peaks(peaks: Peaks) -> list[str]:
     low, middle, high = np.nanpercentile(peaks.largest, [5, 50, 95])
     return [f'at {peaks.sensor}: {middle:.1f} g in the median (5 % below {low:.1f}, 5 % above '
             f'{high:.1f}), {1000 * np.nanmedian(peaks.widths):.0f} ms wide at half their height; '
-            f'{peaks.share_early:.0%} of the falls pass {EARLY:g} g before the impact']
+            '{:.0%} of the falls pass {:g} g before the first contact, {:.0%} before the pelvis '
+            'touches the ground'.format(peaks.shares_early[0], EARLY, peaks.shares_early[1])]
 
 
 def _bones(summary: DatasetSummary) -> list[str]:

@@ -28,35 +28,42 @@ class Peaks:
     """(f,) s: full width of that peak at half its height, in whole samples."""
     before_impact: np.ndarray = field(default_factory=_empty)
     """(f,) g: the largest before the frame of the first contact; NaN without one."""
+    before_pelvis: np.ndarray = field(default_factory=_empty)
+    """(f,) g: the largest before the pelvis touches the ground; NaN if it never does."""
 
     @classmethod
-    def of(cls, sensor: dict, falls: Iterable[np.ndarray], impacts: np.ndarray,
+    def of(cls, sensor: dict, falls: Iterable[np.ndarray], impacts: np.ndarray, pelvis: np.ndarray,
            interval: float) -> Peaks:
         """Of samples (s, 3) m/s^2 of each fall, ``interval`` s apart, the first at the start;
-        ``impacts`` (f,) s from the start, NaN without one.
+        ``impacts`` and ``pelvis`` (f,) s from the start to first contact and to that of the pelvis,
+        NaN without one.
         """
         found = np.array([
-            _peak(np.linalg.norm(samples, axis=1) / STANDARD_GRAVITY, impact / interval)
-            for samples, impact in zip(falls, impacts, strict=True)]).reshape(-1, 3)
-        return cls(sensor['name'], sensor['bone'], found[:, 0], found[:, 1] * interval, found[:, 2])
+            _peak(np.linalg.norm(samples, axis=1) / STANDARD_GRAVITY, times / interval)
+            for samples, times in zip(falls, np.stack([impacts, pelvis], axis=1), strict=True)
+            ]).reshape(-1, 4)
+        return cls(sensor['name'], sensor['bone'], found[:, 0], found[:, 1] * interval,
+                   found[:, 2], found[:, 3])
 
     @property
-    def share_early(self) -> float:
-        """Share of the falls with an impact that pass EARLY before it."""
-        known = self.before_impact[np.isfinite(self.before_impact)]
-        return float((known > EARLY).mean()) if len(known) else 0.0
+    def shares_early(self) -> tuple[float, float]:
+        """Shares of the falls that pass EARLY before the first contact, of those that have one, and
+        before the pelvis touches the ground, of those in which it does.
+        """
+        return tuple(float((known > EARLY).mean()) if len(known) else 0.0 for known in (
+            each[np.isfinite(each)] for each in (self.before_impact, self.before_pelvis)))
 
 
-def _peak(force: np.ndarray, impact: float) -> tuple[float, float, float]:
-    """Largest value, its full width at half maximum in samples, and the largest before sample
-    ``impact``.
+def _peak(force: np.ndarray, times: np.ndarray) -> tuple[float, float, float, float]:
+    """Largest value, its full width at half maximum in samples, and the largest before each of two
+    ``times`` in samples.
     """
     force = force[np.isfinite(force)]
     if not len(force):
-        return np.nan, np.nan, np.nan
+        return (np.nan,) * 4
     top = int(force.argmax())
     low = np.flatnonzero(force < force[top] / 2)
     before, after = low[low < top], low[low > top]
     width = (after[0] if len(after) else len(force)) - (before[-1] + 1 if len(before) else 0)
-    early = force[:int(impact)] if np.isfinite(impact) else force[:0]
-    return force[top], width, early.max() if len(early) else np.nan
+    early = [force[:int(time)] if np.isfinite(time) else force[:0] for time in times]
+    return force[top], width, *(part.max() if len(part) else np.nan for part in early)
