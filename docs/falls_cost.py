@@ -116,7 +116,7 @@ def mujocos(recipe: Recipe, count: int, accuracy: str, threads: int) -> float:
         start = start_of(recipe, number)
         with Simulation(start.scene, accuracy=accuracy, engine='mujoco') as simulation:
             falls.begin(simulation, start)
-            simulation._engine._run(step, 1, ())
+            simulation._engine.take_substeps(step, 1)
             model, data = simulation._engine._model, simulation._engine._data
             state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
             mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
