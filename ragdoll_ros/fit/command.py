@@ -1,4 +1,4 @@
-"""Fit a ragdoll to a rigged, skinned character, or convert a robot's URDF to a ragdoll."""
+"""Fit a ragdoll to a rigged, skinned character, or convert a robot's URDF or SDF to a ragdoll."""
 import argparse
 import math
 import sys
@@ -16,6 +16,7 @@ from .pipeline import Fit, FitOptions, fit_characters
 from .reading.character import read_character
 from .report import animations_report, captures_report, doll_report, fit_report
 from .robots.robot import read_urdf
+from .robots.sdf_dolls import read_sdf
 from .skeleton.skin_tree import TREES
 
 EPILOG = """\
@@ -23,17 +24,17 @@ example:
   ragdoll_fit character.glb -o doll.yaml --picture doll.png
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=doll.yaml
 
-A .urdf becomes a doll too: a robot without motor torques; so does a .xacro, where xacro is
-installed. A .yaml with a doll or a scene is
-checked and reported.
-If the file has several characters, each becomes a doll: DOLL.yaml is a scene with all of them in
-place; DOLL.urdf and OUT.png get _1, _2, ... before the suffix.
+A .urdf or .sdf becomes a doll too: a robot without motor torques; so does a .xacro, where xacro is
+installed. A .yaml with a doll or a scene is checked and reported.
+If the file has several characters or robots, each becomes a doll: DOLL.yaml is a scene with all of
+them in place; DOLL.urdf and OUT.png get _1, _2, ... before the suffix.
 The report ends with a verdict on the doll: good, doubtful or wrong.
 Exit code 0: success; 2: invalid file or option; 3: --strict, and the doll is not good."""
 
 PICTURE_SUFFIXES = ('.png', '.jpg', '.svg', '.pdf')
 
-DOLL_SUFFIXES, ROBOT_SUFFIXES = ('.yaml', '.yml'), ('.urdf', '.xml', '.xacro')
+DOLL_SUFFIXES, SDF_SUFFIXES = ('.yaml', '.yml'), ('.sdf', '.world')
+ROBOT_SUFFIXES = ('.urdf', '.xml', '.xacro', *SDF_SUFFIXES)
 """Files that define bodies; for all other files, characters, bodies are fitted."""
 
 FIT_ARGUMENTS = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest', 'keep',
@@ -61,7 +62,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         'ragdoll_fit', description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('input', help='a .glb or .gltf with a skinned character, a .urdf, a .yaml')
+    parser.add_argument('input', help='a .glb, .gltf or .vrm with a skinned character, a .urdf, '
+                        '.xacro or .sdf, a .yaml')
     parser.add_argument('-o', '--output', metavar='DOLL.yaml', help='write the doll to this file')
     parser.add_argument('--urdf', metavar='DOLL.urdf', help='write the doll as URDF too')
     parser.add_argument('--dialect', choices=('ros', 'bullet'), default='ros',
@@ -136,6 +138,11 @@ def _make_dolls(options: argparse.Namespace, path: Path) -> list[tuple[Placement
     """Each doll with its placement, its fit if it was fitted, and its report."""
     if path.suffix.lower() in DOLL_SUFFIXES:
         return _load_dolls(options)
+    if path.suffix.lower() in SDF_SUFFIXES:
+        robots = read_sdf(path)
+        heads = _headings([placement.doll for placement, _ in robots], 'robot')
+        return [(placement, None, head + doll_report(placement.doll, notes))
+                for (placement, notes), head in zip(robots, heads, strict=True)]
     if path.suffix.lower() in ROBOT_SUFFIXES:
         doll, notes = read_urdf(path)
         return [(Placement(doll), None, doll_report(doll, notes))]

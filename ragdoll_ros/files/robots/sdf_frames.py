@@ -28,11 +28,13 @@ class SdfModel:
     Its methods raise RecursionError where a frame is relative to itself.
     """
 
-    def __init__(self, element: ElementTree.Element, prefix: str = '') -> None:
+    def __init__(self, element: ElementTree.Element, prefix: str = '',
+                 is_static: bool = False) -> None:
         self.element, self.prefix = element, prefix
+        self.is_static = is_static or element.findtext('static', '').strip() in ('true', '1')
         self.elements = {text_of(child, 'name', child.tag): child for child in element
                          if child.tag in FRAMED}
-        self.models = {name: SdfModel(child, f'{prefix}{name}::')
+        self.models = {name: SdfModel(child, f'{prefix}{name}::', self.is_static)
                        for name, child in self.elements.items() if child.tag == 'model'}
         self._poses: dict[str, Pose] = {}
 
@@ -56,7 +58,7 @@ class SdfModel:
         if found is None:
             return self.pose(base)
         named = found.get('relative_to') or found.get('frame') or base
-        return self.pose(named).compose(_parse_pose(
+        return self.pose(named).compose(parse_pose(
             found, f'{self.prefix}{element.get("name", element.tag)}.pose'))
 
     def link_of(self, name: str) -> str | None:
@@ -100,7 +102,7 @@ def child_text(element: ElementTree.Element, tag: str, where: str) -> str:
     return text
 
 
-def _parse_pose(element: ElementTree.Element, where: str) -> Pose:
+def parse_pose(element: ElementTree.Element, where: str) -> Pose:
     """Pose of a <pose>: x y z roll pitch yaw, in rad or degrees, or x y z and a quaternion."""
     text = (element.text or '').strip()
     if not text:

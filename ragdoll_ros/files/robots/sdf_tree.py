@@ -1,10 +1,12 @@
-"""SDF parser: links of models and worlds with their collision shapes, as a UrdfTree.
+"""SDF parser: links of models and worlds with shapes and inertias, and joints, as a UrdfTree.
 
-Names are those in the file's only model; in a world, or of several models, model::link. Visuals,
-inertias and surfaces are not read. http://sdformat.org/spec
+Names are those in the file's only model; in a world, or of several models, model::link. Surfaces,
+sensors and plugins are not read. http://sdformat.org/spec
 """
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,13 +14,15 @@ import numpy as np
 from ...model import errors, rotation
 from ...model.pose import Pose
 from ...model.shapes import SIZES
-from .sdf_frames import SdfModel, child_text
+from .sdf_frames import SdfModel, child_text, parse_pose, text_of
 from .urdf_tree import (
     PLANE,
     ROTATING_KINDS,
+    SHORTEST,
     UrdfJoint,
     UrdfLink,
     UrdfMesh,
+    UrdfMimic,
     UrdfTree,
     add_plane,
     add_shape,
@@ -31,7 +35,22 @@ WORLD = ''
 UNLIMITED = 1e15
 """rad; the limits of a joint that has none are 1e16 or infinite."""
 
-X = np.array([1.0, 0.0, 0.0])
+AXES = {**dict.fromkeys((*ROTATING_KINDS, 'prismatic'), ('axis',)),
+        **dict.fromkeys(('universal', 'revolute2'), ('axis', 'axis2'))}
+"""Axes of the kinds of joints that have some: of those with two, two hinges become."""
+
+KINDS = {'ball': 'spherical', 'universal': 'revolute', 'revolute2': 'revolute'}
+"""URDF's kinds for those of SDF that have another name there."""
+
+
+class SdfAxis(NamedTuple):
+    """An axis (3,) of a joint, in its frame; N m s/rad and N m (N s/m and N if prismatic)."""
+
+    xyz: np.ndarray = np.array([1.0, 0.0, 0.0])
+    limits: tuple[float, float] | None = None
+    damping: float = 0.0
+    friction: float = 0.0
+    mimics: UrdfMimic | None = None
 
 
 @dataclass
@@ -43,8 +62,7 @@ class SdfJoint:
     parent: str
     child: str
     pose: Pose
-    axis: np.ndarray
-    limits: tuple[float, float] | None
+    axes: list[SdfAxis]
 
 
 def parse_sdf(text: str) -> UrdfTree:
@@ -90,13 +108,18 @@ def _tree(name: str, links: dict[str, UrdfLink], poses: dict[str, Pose],
     tree = UrdfTree(name, dict(links), {})
     for joint in joints:
         if joint.child in tree.joints:
+            tree.left_out.append(joint.name)
             continue
-        turning = f'{joint.name}/joint'
-        tree.links[turning] = UrdfLink(turning)
-        tree.joints[turning] = UrdfJoint(
-            joint.name, joint.kind, joint.parent, turning, poses[joint.parent].relative(joint.pose),
-            joint.axis, joint.limits, 0.0)
-        tree.joints[joint.child] = _fixed(turning, joint.child,
+        above, origin = joint.parent, poses[joint.parent].relative(joint.pose)
+        for ending, axis in zip(('', '/2'), joint.axes, strict=False):
+            turning = f'{joint.name}/joint{ending}'
+            tree.links[turning] = UrdfLink(turning, is_in_file=False)
+            unlimited = joint.kind == 'revolute' and axis.limits is None
+            tree.joints[turning] = UrdfJoint(
+                f'{joint.name}{ending}', 'continuous' if unlimited else joint.kind, above, turning,
+                origin, *axis)
+            above, origin = turning, Pose()
+        tree.joints[joint.child] = _fixed(above, joint.child,
                                           joint.pose.relative(poses[joint.child]))
     for link in links:
         if link != WORLD and link not in tree.joints:
@@ -107,23 +130,49 @@ def _tree(name: str, links: dict[str, UrdfLink], poses: dict[str, Pose],
 
 
 def _fixed(parent: str, child: str, pose: Pose) -> UrdfJoint:
-    return UrdfJoint(f'{child}/fixed', 'fixed', parent, child, pose, X, None, 0.0)
+    return UrdfJoint(f'{child}/fixed', 'fixed', parent, child, pose, *SdfAxis())
 
 
 def _links(scope: SdfModel) -> Iterator[tuple[UrdfLink, Pose]]:
     """Links of a model with their poses in its frame; what is included is one that has no shape."""
     for element in scope.element.findall('link'):
         name = element.get('name', '')
-        pose, link = scope.place(element, ''), UrdfLink(f'{scope.prefix}{name}')
-        for collision in element.findall('collision'):
-            link.collides = True
-            for geometry in collision.findall('geometry/*')[:1]:
-                _add_geometry(link, geometry, pose.relative(scope.place(collision, name)))
+        pose = scope.place(element, '')
+        link = UrdfLink(f'{scope.prefix}{name}', is_static=scope.is_static)
+        inertial = element.find('inertial')
+        if inertial is not None:
+            _add_inertial(link, inertial)
+        collisions = element.findall('collision')
+        link.collides = bool(collisions)
+        for part in collisions or element.findall('visual'):
+            for geometry in part.findall('geometry/*')[:1]:
+                _add_geometry(link, geometry, pose.relative(scope.place(part, name)))
         yield link, pose
     for element in scope.element.findall('include'):
         uri = child_text(element, 'uri', f'{scope.prefix}include')
         name = (element.findtext('name') or uri.rstrip('/').rpartition('/')[2]).strip()
         yield UrdfLink(f'{scope.prefix}{name}', collides=True, left_out=['an <include>']), Pose()
+
+
+def _add_inertial(link: UrdfLink, element: ElementTree.Element) -> None:
+    where = f'link {link.name}.inertial'
+    link.mass = _number(element, 'mass', where, 0.0)
+    errors.check_range(f'{where}.mass', link.mass, 0, math.inf)
+    pose = element.find('pose')
+    link.centre = Pose() if pose is None else parse_pose(pose, f'{where}.pose')
+    inertia = element.find('inertia')
+    if inertia is not None:
+        xx, xy, xz, yy, yz, zz = (_number(inertia, key, where, default) for key, default in (
+            ('ixx', 1.0), ('ixy', 0.0), ('ixz', 0.0), ('iyy', 1.0), ('iyz', 0.0), ('izz', 1.0)))
+        link.inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _number(element: ElementTree.Element, path: str, where: str, default: float) -> float:
+    """The number that an element has at a ``path`` of tags."""
+    text = element.findtext(path)
+    if text is None:
+        return default
+    return float(parse_numbers(text, 1, f'{where}.{path.replace("/", ".")}')[0])
 
 
 def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose) -> None:
@@ -145,41 +194,48 @@ def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose) -> N
 
 
 def _joints(scope: SdfModel, frame: Pose, version: str) -> Iterator[SdfJoint]:
-    """Joints of a model between links; those that neither turn nor slide are fixed."""
+    """Joints of a model between links; those of a kind without AXES have one that means nothing."""
     for element in scope.element.findall('joint'):
         name = f'{scope.prefix}{element.get("name", "")}'
         ends = [child_text(element, end, f'joint {name}') for end in ('parent', 'child')]
         parent, child = map(scope.link_of, ends)
         if child is None:
             continue
-        pose = scope.place(element, ends[1])
-        kind = element.get('type', '')
-        rotating, moving = kind in ROTATING_KINDS, kind in (*ROTATING_KINDS, 'prismatic')
-        yield SdfJoint(name, kind if moving else 'fixed',
-                       WORLD if parent is None else parent, child, frame.compose(pose),
-                       _axis(scope, element, pose, version) if moving else X,
-                       _limits(element, f'joint {name}.limit') if rotating else None)
+        pose, kind = scope.place(element, ends[1]), element.get('type', '')
+        axes = [_axis(scope, element, tag, pose, version) for tag in AXES.get(kind, ())]
+        if kind == 'prismatic':
+            # As in URDF: a doll has none that slides.
+            axes = [axes[0]._replace(limits=None)]
+        yield SdfJoint(name, KINDS.get(kind, kind), WORLD if parent is None else parent, child,
+                       frame.compose(pose), axes or [SdfAxis()])
 
 
-def _axis(scope: SdfModel, joint: ElementTree.Element, pose: Pose, version: str) -> np.ndarray:
-    """Axis (3,) of a joint, which has a pose in the model's frame, in its own frame."""
-    where = f'joint {scope.prefix}{joint.get("name")}.axis'
-    xyz = joint.find('axis/xyz')
+def _axis(scope: SdfModel, joint: ElementTree.Element, tag: str, pose: Pose,
+          version: str) -> SdfAxis:
+    """The axis ``tag`` of a joint, which has a ``pose`` in the model's frame."""
+    where = f'joint {scope.prefix}{joint.get("name")}.{tag}'
+    found = joint.find(tag)
+    if found is None:
+        return SdfAxis(np.array([0.0, 0.0, 1.0]))
+    xyz = found.find('xyz')
     axis = parse_numbers('0 0 1' if xyz is None else xyz.text or '', 3, where)
-    if np.linalg.norm(axis) < 1e-9:
+    if np.linalg.norm(axis) < SHORTEST:
         raise errors.NotUnit(where, axis.tolist(), 'a direction, not zero')
     named = '' if xyz is None else xyz.get('expressed_in', '')
     in_model = (version in ('1.0', '1.2', '1.3', '1.4')
-                or joint.findtext('axis/use_parent_model_frame') in ('true', '1'))
+                or found.findtext('use_parent_model_frame') in ('true', '1'))
     # Until 1.4 axes are in the model's frame; until 1.6 where the file says so; then as it names.
     if named or in_model:
         axis = rotation.rotate(pose.relative(scope.pose(named)).orientation, axis)
-    return axis / np.linalg.norm(axis)
+    return SdfAxis(axis / np.linalg.norm(axis), _limits(found, f'{where}.limit'),
+                   max(_number(found, 'dynamics/damping', where, 0.0), 0.0),
+                   _number(found, 'dynamics/friction', where, 0.0),
+                   _mimics(found.find('mimic'), scope.prefix, where))
 
 
-def _limits(joint: ElementTree.Element, where: str) -> tuple[float, float] | None:
-    """Limits of a joint, rad; None without."""
-    texts = [joint.findtext(f'axis/limit/{end}', default) for end, default in (
+def _limits(axis: ElementTree.Element, where: str) -> tuple[float, float] | None:
+    """Limits of an axis, rad or m; None without."""
+    texts = [axis.findtext(f'limit/{end}', default) for end, default in (
         ('lower', '-inf'), ('upper', 'inf'))]
     try:
         lower, upper = map(float, texts)
@@ -188,3 +244,14 @@ def _limits(joint: ElementTree.Element, where: str) -> tuple[float, float] | Non
     if not lower <= upper:
         raise errors.LimitsReversed(where, (lower, upper), 'lower <= upper')
     return None if max(abs(lower), abs(upper)) > UNLIMITED else (lower, upper)
+
+
+def _mimics(element: ElementTree.Element | None, prefix: str, where: str) -> UrdfMimic | None:
+    """What an axis follows: multiplier * (the leader's value - reference) + offset."""
+    if element is None:
+        return None
+    multiplier, offset, reference = (_number(element, key, f'{where}.mimic', default)
+                                     for key, default in (
+        ('multiplier', 1.0), ('offset', 0.0), ('reference', 0.0)))
+    return UrdfMimic(f'{prefix}{text_of(element, "joint", f"{where}.mimic")}', multiplier,
+                     offset - multiplier * reference)

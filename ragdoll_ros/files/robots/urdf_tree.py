@@ -54,6 +54,10 @@ class UrdfLink:
     """Whether its shapes and meshes are those of <collision>, else of <visual>."""
     has_contact: bool = False
     """Whether it has PyBullet's <contact>: friction, restitution."""
+    is_static: bool = False
+    """Whether its model is <static>, in SDF."""
+    is_in_file: bool = True
+    """Whether the file has it; not for the frame of a joint of SDF."""
 
 
 class UrdfMimic(NamedTuple):
@@ -88,6 +92,8 @@ class UrdfTree:
     name: str
     links: dict[str, UrdfLink]
     joints: dict[str, UrdfJoint]
+    left_out: list[str] = field(default_factory=list)
+    """Names of joints that would close a loop: another one moves their child. URDF has none."""
 
     @property
     def order(self) -> list[str]:

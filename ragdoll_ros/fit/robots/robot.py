@@ -40,7 +40,7 @@ def doll_from_urdf(text: str) -> Ragdoll:
 
     Its frame is the root link's; joints are at angle zero, or at the nearest angle within limits.
     """
-    return _doll(parse_urdf(text))[0]
+    return doll_from_tree(parse_urdf(text))[0]
 
 
 def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
@@ -52,13 +52,17 @@ def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
     try:
         is_xacro = path.suffix.lower() == '.xacro'
         text = expand_xacro(path) if is_xacro else read_xml(path, 'robot')
-        doll, notes = _doll(parse_urdf(text), path.parent)
+        doll, notes = doll_from_tree(parse_urdf(text), path.parent)
         return doll, tuple(notes)
     except errors.ModelError as error:
         raise errors.ModelErrors(str(path), [error]) from None
 
 
-def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str]]:
+def doll_from_tree(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str]]:
+    """Doll of links and joints, and notes; ``folder`` is that of their file, for its meshes.
+
+    Raises a ModelError for what no doll can be.
+    """
     notes: list[str] = []
     angles = tree.initial_angles
     poses = tree.poses(angles)
@@ -91,7 +95,9 @@ def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str
         if joint.kind not in ('fixed', 'floating'):
             notes.append(f'{joint.name}: no link above it has a shape: ignored')
     notes += _note_friction(tree)
-    frames = _frames(poses, carriers, names, bones)
+    notes += [f'{name}: closes a loop, of which a doll has none: ignored' for name in tree.left_out]
+    frames = _frames({name: pose for name, pose in poses.items() if tree.links[name].is_in_file},
+                     carriers, names, bones)
     return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
 
 
@@ -141,7 +147,7 @@ def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], light: Collectio
     parent, child = names[carriers[chain[0].parent]], names[name]
     anchor = poses[chain[0].child].position
     for joint in chain:
-        if joint.kind in ('prismatic', 'planar'):
+        if joint.kind not in (*ROTATING_KINDS, 'fixed'):
             notes.append(f'{joint.name}: {joint.kind} joints are not supported: fixed')
         if joint.kind == 'floating':
             notes.append(f'{joint.name}: floating joints are not supported: a ball joint')

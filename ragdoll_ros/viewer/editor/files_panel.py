@@ -53,7 +53,8 @@ class FilesPanel:
             'Upload a scene or doll', icon='upload', mime_type=','.join(DOLLS))
         self.fit_button = gui.add_upload_button(
             'Fit a character', icon='man', mime_type=','.join(CHARACTERS),
-            hint=f'A skinned .glb, .gltf or .vrm, or a .urdf; up to {LARGEST_UPLOAD // 10**6} MB')
+            hint=f'A skinned .glb, .gltf or .vrm, or a .urdf or .sdf; up to '
+            f'{LARGEST_UPLOAD // 10**6} MB')
         self.progress = gui.add_progress_bar(0.0, animated=True, visible=False)
         self.message = gui.add_html('')
         self.saved.on_update(lambda event: event.client and self._load_listed(event.target.value))

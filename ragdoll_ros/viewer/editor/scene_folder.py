@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 LARGEST_UPLOAD = 100_000_000
 """Bytes: characters with large textures have tens of MB."""
 
-CHARACTERS = ('.glb', '.gltf', '.vrm', '.urdf')
+ROBOTS = ('.urdf', '.sdf')
+
+CHARACTERS = ('.glb', '.gltf', '.vrm', *ROBOTS)
 DOLLS = ('.yaml', '.yml')
 MESHES = SUFFIXES
 
@@ -116,7 +118,7 @@ class SceneFolder:
             raise errors.ModelErrors(name, [error]) from None
         except errors.ModelErrors as error:
             raise errors.ModelErrors(name, [_with_advice(each) for each in error.errors]) from None
-        if suffix != '.urdf':
+        if suffix not in ROBOTS:
             progress(0.9, 'saving the character')
             model = str(self._keep(name, content))
             placements = [dataclasses.replace(placement, doll=dataclasses.replace(
@@ -231,6 +233,10 @@ def _fit(path: Path, progress: ProgressCallback) -> tuple[list[Placement], list[
         from ...fit.robots.robot import read_urdf
         doll = read_urdf(path)[0]
         return [Placement(doll)], [judge(doll, measured=True)]
+    if path.suffix.lower() == '.sdf':
+        from ...fit.robots.sdf_dolls import read_sdf
+        placements = [placement for placement, _ in read_sdf(path)]
+        return placements, [judge(placement.doll, measured=True) for placement in placements]
     character = read_character(path)
     progress(0.4, f'fitting {len(character.bone_names)} bones, {len(character.vertices)} vertices')
     fits = fit_characters(character)
