@@ -198,6 +198,37 @@ def test_a_link_of_next_to_nothing_is_merged_and_named(tmp_path):
     assert load_doll(str(tmp_path / 'doll.yaml')) == doll
 
 
+def test_a_root_without_a_mass_is_part_of_what_is_fixed_to_it(tmp_path):
+    """As PR2's base_footprint: no mass is invented for it."""
+    doll, notes = read(tmp_path, link('foot', mass=0), link('a', mass=200), link('b'),
+                       joint('a', 'foot', 'fixed'), joint('b'))
+    assert [bone.name for bone in doll.bones] == ['a', 'b'] and notes == ()
+    assert (doll.mass, len(doll.root.shape.parts)) == (201, 2)
+
+
+def test_a_moving_link_without_a_mass_and_next_to_no_size_is_merged_and_named(tmp_path):
+    doll, notes = read(tmp_path, link('a', mass=200), joint('b'),
+                       link('b', '<box size="0.001 0.001 0.001"/>', 0))
+    assert [bone.name for bone in doll.bones] == ['a']
+    assert notes == ('b: 1e-06 kg, less than a millionth of the robot: part of a',)
+
+
+def test_an_inertia_of_rounding_alone_is_that_of_a_solid(tmp_path):
+    """Exports have moments of 1e-24 and -1e-24 kg m^2 where others are 1e-4."""
+    tiny = ('<inertia ixx="1e-24" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial>')
+    doll, notes = read(tmp_path, link('a').replace('</inertial>', tiny))
+    assert notes == ('a: no body has its inertia: that of a uniform solid is used',)
+    assert doll.root.inertia == pytest.approx((0.01 / 6,) * 3)
+
+
+def test_a_fixed_joint_needs_no_axis_and_a_prefix_no_namespace(tmp_path):
+    doll, _ = read(tmp_path, link('a'), link('b'), joint('b', kind='fixed', axis=''),
+                   '<gazebo><sensor:camera a:b="1"><rate>3</rate></sensor:camera></gazebo>')
+    assert [each.kind for each in doll.joints] == ['fixed']
+    with pytest.raises(errors.ModelErrors, match=r'unbound prefix.*expand a xacro first'):
+        read(tmp_path, link('a'), '<xacro:wheel name="b"/>')
+
+
 def test_what_is_only_seen_is_a_body_where_nothing_has_a_mass(tmp_path):
     seen = link('b', mass=0, tag='visual')
     assert len(read(tmp_path, link('a', mass=0), seen, joint('b'))[0].bones) == 2

@@ -129,8 +129,8 @@ def test_poses_and_masses_are_those_of_pybullet(tmp_path):
         <mass>1</mass>{inertia}</inertial>{ball}</link>
         <link name="c"><pose>0.3 0.2 1.4 0 0 0.3</pose><inertial><mass>0.5</mass>{inertia}
         </inertial>{ball}</link>
-        <joint name="ab" type="revolute"><parent>a</parent><child>b</child><axis><xyz>0 0.8 0.6</xyz>
-        <limit><lower>-1</lower><upper>0.5</upper></limit></axis></joint>
+        <joint name="ab" type="revolute"><parent>a</parent><child>b</child><axis>
+        <xyz>0 0.8 0.6</xyz><limit><lower>-1</lower><upper>0.5</upper></limit></axis></joint>
         <joint name="bc" type="revolute"><parent>b</parent><child>c</child><axis><xyz>1 0 0</xyz>
         <limit><lower>-2</lower><upper>2</upper></limit></axis></joint></model>""".format(
         inertia=INERTIA, ball='<collision name="k"><geometry><sphere><radius>0.1</radius></sphere>'
@@ -255,7 +255,7 @@ def test_a_link_without_a_mass_has_that_of_water(tmp_path):
 
 @pytest.mark.parametrize(('body', 'said'), [
     ('<model name="m"><static>1</static>' + link('a') + '</model>',
-     "model: WrongForm: ['a']; expected a model that moves: a scene has what is <static> as a body"),
+     "model: WrongForm: ['a']; expected a model that moves: a scene has what is <static> as a"),
     ('<model name="m"><link name="a"/></model>', "link: WrongForm: ['a']; expected a link with a"),
     ('<model name="m">' + link('a', mass='heavy') + '</model>',
      "link a.inertial.mass: WrongForm: 'heavy'; expected a finite number"),

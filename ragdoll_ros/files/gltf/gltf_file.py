@@ -23,7 +23,7 @@ MAX_JSON_TOKENS = 500_000
 """Commas and brackets of the JSON: each becomes a Python object of 64 bytes or more."""
 
 UNSUPPORTED_EXTENSIONS = ('EXT_meshopt_compression', 'KHR_meshopt_compression')
-"""The only decoder with wheels on PyPI is meshopt (since October 2026), for Python 3.11 and up."""
+"""The only decoder with wheels on PyPI is meshopt (since October 2026), for Python 3.12 and up."""
 
 MAX_INTEGER = 2 ** 53
 """Upper bound of integers in the JSON (section 2.7 of the specification)."""
@@ -213,7 +213,8 @@ def _parse(text: bytes) -> dict:
     for extension in get_container(data, 'extensionsRequired', list, ''):
         if extension in UNSUPPORTED_EXTENSIONS:
             raise errors.WrongForm('extensionsRequired', extension,
-                                   'an uncompressed file: export it without compression')
+                                   'a file without meshopt compression: export it so, or undo it '
+                                   'by `npx @gltf-transform/cli copy IN.glb OUT.glb`')
     return data | {key: get_objects(data, key) for key in INDEXED_LISTS}
 
 

@@ -25,6 +25,8 @@ JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floati
 
 ROTATING_KINDS = ('revolute', 'continuous')
 
+AXIAL_KINDS = (*ROTATING_KINDS, 'prismatic', 'planar')
+
 
 @dataclass(frozen=True)
 class UrdfMesh:
@@ -211,7 +213,9 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
             raise errors.WrongForm(where, None, f'a <{end} link="..."/>')
         ends.append(_text(found, 'link', f'{where}.{end}'))
     found = element.find('axis')
-    axis = np.array([1.0, 0, 0]) if found is None else _vector(found, 'xyz', where)
+    # A joint without an axis may have one, of zeros or of nothing.
+    axis = np.array([1.0, 0, 0]) if found is None or kind not in AXIAL_KINDS else _vector(
+        found, 'xyz', where)
     if np.linalg.norm(axis) < SHORTEST:
         if kind in ROTATING_KINDS:
             raise errors.NotUnit(f'{where}.axis', axis.tolist(), 'a direction, not zero')

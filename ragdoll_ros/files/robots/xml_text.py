@@ -1,5 +1,6 @@
 """XML of robots and worlds as it is found: encodings, limits of size, errors with their place."""
 import codecs
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -9,6 +10,11 @@ from ...model import errors
 
 LARGEST_TEXT = 32_000_000
 """Bytes of a file, and characters of a text."""
+
+PREFIX = re.compile(r'<([A-Za-z_][\w.-]*):[A-Za-z_]|\s([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*\s*=')
+"""The prefix of the name of an element, or of an attribute."""
+
+FIRST_TAG = re.compile(r'(<(?:robot|sdf)\b)')
 
 NAMES = {'robot': 'URDF', 'sdf': 'SDF'}
 """Format of each root element."""
@@ -31,13 +37,25 @@ def parse_root(text: str, tag: str) -> ElementTree.Element:
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
         raise errors.Unreadable('', 'a DOCTYPE', f'{NAMES[tag]} without entities')
     try:
-        root = ElementTree.fromstring(text)
+        root = ElementTree.fromstring(_declare_prefixes(text))
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         raise errors.Unreadable('', str(error),
                                 f'XML: a <{tag}> (expand a xacro first)') from None
     if root.tag != tag:
         raise errors.WrongForm('', f'<{root.tag}>', f'a <{tag}>')
     return root
+
+
+def _declare_prefixes(text: str) -> str:
+    """The text, whose first element declares every prefix that the text uses and does not declare,
+    as those of sensors in old files: other tools do not look at prefixes. That of xacro is not: it
+    has to be expanded.
+    """
+    prefixes = {prefix for found in PREFIX.finditer(text) for prefix in found.groups() if prefix}
+    missing = [prefix for prefix in sorted(prefixes)
+               if prefix not in ('xml', 'xmlns', 'xacro') and f'xmlns:{prefix}' not in text]
+    declared = ''.join(f' xmlns:{prefix}="{prefix}"' for prefix in missing)
+    return FIRST_TAG.sub(rf'\1{declared}', text, count=1)
 
 
 def parse_numbers(text: str, length: int, where: str) -> np.ndarray:

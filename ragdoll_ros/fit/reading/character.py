@@ -13,6 +13,7 @@ from ...model import errors, rotation
 from ...model.skeleton import Appearance
 from .draco import decompress
 from .materials import Materials
+from .other_formats import refuse_other_formats
 from .rigid_meshes import add_rigid_meshes
 from .scale import metres_per_unit
 from .skins import Skins, read_skins
@@ -90,6 +91,7 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
     if scale is not None:
         errors.check_positive('scale', scale)
     try:
+        refuse_other_formats(Path(path))
         file = decompress(GltfFile(path))
         # Overflow shows in the results, which are checked.
         with np.errstate(over='ignore', invalid='ignore'):

@@ -32,6 +32,10 @@ ROUNDING = 1e-6
 """Relative rounding error of numbers with six digits."""
 
 
+THINNEST = 1e-9
+"""Least over largest moment of a body: a wire of 1 m and 0.05 mm. Rounding leaves less of zero."""
+
+
 class LinkMeshes:
     """Meshes of a URDF in ``folder`` (None: unknown) as shapes; each file is fitted once."""
 
@@ -147,7 +151,7 @@ def _is_physical(link: UrdfLink) -> bool:
     if link.inertia is None or link.mass <= 0:
         return False
     least, middle, most = np.linalg.eigvalsh(link.inertia)
-    return bool(least > 0 and most <= (least + middle) * (1 + ROUNDING))
+    return bool(least > THINNEST * most and most <= (least + middle) * (1 + ROUNDING))
 
 
 def _with_capsules(shapes: Sequence[PlacedShape]) -> list[PlacedShape]:

@@ -21,7 +21,7 @@ from ...files.robots.xml_text import read_xml
 from ...model import errors, rotation
 from ...model.pose import Pose
 from ...model.ragdoll import MAX_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
-from .link_bodies import LinkMeshes, link_shapes, make_bone
+from .link_bodies import DEFAULT_DENSITY, LinkMeshes, PlacedShape, link_shapes, make_bone
 from .xacro_text import expand_xacro
 
 ROTATING_KINDS = ('revolute', 'continuous', 'floating', 'spherical')
@@ -76,11 +76,11 @@ def doll_from_tree(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll,
         why = f' ({notes[0]})' if notes else ''
         raise errors.WrongForm('link', list(tree.links)[:5],
                                f'a link with a shape or an inertia{why}')
-    light = _light_links(tree)
+    light = _light_links(tree, shapes)
     carriers = _find_carriers(tree, shapes, light)
     _merge_shapes(tree, shapes, carriers, poses)
-    notes += [f'{name}: {tree.links[name].mass:.2g} kg, less than a millionth of the robot: part '
-              f'of {carriers[name]}' for name in light if shapes[name] and carriers[name] != name]
+    notes += [f'{name}: {mass:.2g} kg, less than a millionth of the robot: part of {carriers[name]}'
+              for name, mass in light.items() if shapes[name] and carriers[name] != name]
     names = _unique_names([name for name in tree.links if carriers[name] == name], [WORLD])
     root = next(name for name in tree.order if carriers[name] == name)
     bones = [make_bone(text, shapes[name], tree.links[name], poses[name],
@@ -101,10 +101,12 @@ def doll_from_tree(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll,
     return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
 
 
-def _light_links(tree: UrdfTree) -> list[str]:
-    """Links with a mass that is less than LIGHTEST_SHARE of the robot's."""
+def _light_links(tree: UrdfTree, shapes: dict[str, list[PlacedShape]]) -> dict[str, float]:
+    """Masses of links below LIGHTEST_SHARE of the robot's; of one without a mass, that of water."""
     whole = sum(link.mass for link in tree.links.values())
-    return [name for name, link in tree.links.items() if 0 < link.mass < LIGHTEST_SHARE * whole]
+    masses = {name: link.mass or DEFAULT_DENSITY * sum(shape.volume for shape, _ in shapes[name])
+              for name, link in tree.links.items()}
+    return {name: mass for name, mass in masses.items() if 0 < mass < LIGHTEST_SHARE * whole}
 
 
 def _find_carriers(tree: UrdfTree, shapes: dict[str, list],
@@ -113,15 +115,23 @@ def _find_carriers(tree: UrdfTree, shapes: dict[str, list],
     itself if it is ``light``.
     """
     carriers: dict[str, str] = {}
+    heavy = any(link.mass > 0 for link in tree.links.values())
     for name in tree.order:
         above = tree.joints[name].parent if name in tree.joints else None
         own = bool(shapes[name]) and name not in light and not (
-            tree.links[name].mass <= 0 and above in carriers and carriers[above] is not None
-            and tree.joints[name].kind == 'fixed')
+            tree.links[name].mass <= 0 and (
+                tree.joints[name].kind == 'fixed' if carriers.get(above)
+                else heavy and _has_fixed_child(tree, name)))
         carriers[name] = name if own else carriers.get(above)
     # Links above the first body, and their other branches, are merged into that body.
     first = next(name for name in tree.order if carriers[name] == name)
     return {name: carrier or first for name, carrier in carriers.items()}
+
+
+def _has_fixed_child(tree: UrdfTree, name: str) -> bool:
+    """Whether a link with a mass is fixed to a link."""
+    return any(joint.kind == 'fixed' and tree.links[child].mass > 0
+               for child, joint in tree.joints.items() if joint.parent == name)
 
 
 def _merge_shapes(tree: UrdfTree, shapes: dict[str, list], carriers: dict[str, str],

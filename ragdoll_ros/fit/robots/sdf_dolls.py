@@ -3,7 +3,7 @@
 Links and joints are read as a UrdfTree (files/robots/sdf_tree.py), in which what is free hangs on a
 link WORLD without a shape; from there on a robot is as that of a URDF (robot.py).
 """
-import os
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -88,7 +88,8 @@ def _free_parts(tree: UrdfTree) -> Iterator[tuple[str, UrdfTree]]:
 def _common_model(names: Sequence[str]) -> str:
     """The model that all links are in, by their names model::link; '' without one."""
     models = [name.split('::')[:-1] for name in names]
-    return '::'.join(os.path.commonprefix(models))
+    shared = itertools.takewhile(lambda parts: len(set(parts)) == 1, zip(*models, strict=False))
+    return '::'.join(parts[0] for parts in shared)
 
 
 def _named_within(tree: UrdfTree, names: Sequence[str], model: str) -> tuple[dict, dict, list[str]]:
