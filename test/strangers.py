@@ -4,7 +4,8 @@ nice python test/strangers.py FOLDER [--suffix .urdf .xacro .sdf] [--csv rows.cs
 
 Each file is fitted as the command does, read back, and dropped from 0.4 m for 5 s at `draft`, in
 one process with a time-out. A file that equals one before it is left out, and so is a .xacro that
-holds only macros: it has no <link> of its own.
+names no robot: it holds macros. Set AMENT_PREFIX_PATH and ROS_PACKAGE_PATH for the packages that
+files name.
 """
 from __future__ import annotations
 
@@ -14,6 +15,7 @@ import csv
 import hashlib
 import io
 import multiprocessing
+import re
 import sys
 import tempfile
 import time
@@ -42,6 +44,8 @@ SLOW = 5.0
 
 ENERGY_EXCESS = 0.01
 """Share of the energy of the drop, m g h of its size, above which energy is from nothing."""
+
+NAMED = re.compile(rb'<robot\b[^>]*\bname\s*=')
 
 SUFFIXES = ('.urdf', '.xacro', '.sdf')
 
@@ -75,7 +79,7 @@ def find_robots(folder: Path, suffixes: tuple[str, ...]) -> Iterator[Path]:
         if path.suffix.lower() not in suffixes or not path.is_file():
             continue
         data = path.read_bytes()
-        if path.suffix.lower() == '.xacro' and not (b'<link' in data or b'<xacro:include' in data):
+        if path.suffix.lower() == '.xacro' and not NAMED.search(data):
             continue
         key = hashlib.sha256(data).digest()
         if key not in seen:

@@ -221,6 +221,20 @@ def test_an_inertia_of_rounding_alone_is_that_of_a_solid(tmp_path):
     assert doll.root.inertia == pytest.approx((0.01 / 6,) * 3)
 
 
+def test_what_touches_at_the_start_does_not_collide(tmp_path):
+    """Hulls around the meshes of neighbours jam: a hand of PMB's Tiago took 3 s a tick."""
+    parts = [link(name) for name in 'abcd'] + [joint(child, xyz=xyz) for child, xyz in (
+        ('b', '0 0 1'), ('c', '0.1005 0 1'), ('d', '0 0.2 1'))]
+    doll, _ = read(tmp_path, *parts)
+    assert doll.no_collision == (('b', 'c'),), 'cubes of 0.1 m, 0.5 mm from each other; d is far'
+
+
+def test_the_world_needs_no_link(tmp_path):
+    held = joint('a', 'world', 'fixed')
+    assert read(tmp_path, link('a'), held) == read(
+        tmp_path, '<link name="world"/>', link('a'), held)
+
+
 def test_a_fixed_joint_needs_no_axis_and_a_prefix_no_namespace(tmp_path):
     doll, _ = read(tmp_path, link('a'), link('b'), joint('b', kind='fixed', axis=''),
                    '<gazebo><sensor:camera a:b="1"><rate>3</rate></sensor:camera></gazebo>')

@@ -20,6 +20,9 @@ SHORTEST = 1e-9
 
 PLANE = 'plane'
 
+WORLD = 'world'
+"""A link that a joint may name and no <link> defines, as Drake and MuJoCo have it."""
+
 JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
 
 
@@ -137,6 +140,8 @@ def parse_urdf(text: str) -> UrdfTree:
     links = [_link(element) for element in root.findall('link')]
     joints = [_joint(element) for element in root.findall('joint')]
     edges = [(joint.parent, joint.child) for joint in joints]
+    if WORLD not in (link.name for link in links) and any(WORLD in edge for edge in edges):
+        links.insert(0, UrdfLink(WORLD))
     for error in tree_errors([link.name for link in links], edges):
         path = error.path.replace('bones', 'link').replace('joints', 'joint')
         raise type(error)(path, error.value, error.expected.replace('bone', 'link'))

@@ -26,8 +26,9 @@ def penetration_depth(bone: Bone, points: np.ndarray) -> np.ndarray:
     return -bone.shape.signed_distance(bone.pose.apply_inverse(points))
 
 
-def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
-    """Names of the pairs of bodies that overlap by more than MIN_OVERLAP."""
+def overlapping_pairs(bones: tuple[Bone, ...],
+                      least: float = MIN_OVERLAP) -> list[tuple[str, str]]:
+    """Names of the pairs of bodies that overlap by more than ``least`` m; a gap if negative."""
     samples = [sample_points(bone) for bone in bones]
     radii = [float(np.linalg.norm(bone.shape.half_extents)) for bone in bones]
     found = []
@@ -35,16 +36,16 @@ def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
         for j in range(i + 1, len(bones)):
             second = bones[j]
             distance = np.linalg.norm(np.subtract(first.position, second.position))
-            if distance < radii[i] + radii[j] and (
-                    penetration_depth(first, samples[j]).max() > MIN_OVERLAP
-                    or penetration_depth(second, samples[i]).max() > MIN_OVERLAP):
+            if distance < radii[i] + radii[j] - min(least, 0.0) and (
+                    penetration_depth(first, samples[j]).max() > least
+                    or penetration_depth(second, samples[i]).max() > least):
                 found.append((first.name, second.name))
     return found
 
 
-def colliding_overlaps(doll: Ragdoll) -> tuple[tuple[str, str], ...]:
-    """Names of the overlapping pairs of bodies whose collision the doll does not exclude."""
-    return tuple(pair for pair in overlapping_pairs(doll.bones)
+def colliding_overlaps(doll: Ragdoll, least: float = MIN_OVERLAP) -> tuple[tuple[str, str], ...]:
+    """Names of the pairs of bodies that overlap by more than ``least`` m and that may collide."""
+    return tuple(pair for pair in overlapping_pairs(doll.bones, least)
                  if frozenset(pair) not in doll.excluded_pairs)
 
 

@@ -21,6 +21,7 @@ from ...files.robots.xml_text import read_xml
 from ...model import errors, rotation
 from ...model.pose import Pose
 from ...model.ragdoll import MAX_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
+from ..bodies.overlap import colliding_overlaps
 from .link_bodies import DEFAULT_DENSITY, LinkMeshes, PlacedShape, link_shapes, make_bone
 from .xacro_text import expand_xacro
 
@@ -30,6 +31,10 @@ ROTATING_KINDS = ('revolute', 'continuous', 'floating', 'spherical')
 LIGHTEST_SHARE = 1e-6
 """Of the robot's mass: lighter links are merged into their parents. Their motion would be that of
 their joints alone, and masses of such ratios are refused (files/doll.py, LARGEST_MASS_RATIO)."""
+
+TOUCHING = 0.001
+"""m; gap at the initial angles up to which two bodies do not collide. Shapes around meshes reach
+beyond them: neighbours would jam in every pose."""
 
 SAME_POINT = 1e-6
 """m; distance up to which successive axes intersect."""
@@ -98,7 +103,8 @@ def doll_from_tree(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll,
     notes += [f'{name}: closes a loop, of which a doll has none: ignored' for name in tree.left_out]
     frames = _frames({name: pose for name, pose in poses.items() if tree.links[name].is_in_file},
                      carriers, names, bones)
-    return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
+    doll = Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames)
+    return replace(doll, no_collision=colliding_overlaps(doll, -TOUCHING)), notes
 
 
 def _light_links(tree: UrdfTree, shapes: dict[str, list[PlacedShape]]) -> dict[str, float]:

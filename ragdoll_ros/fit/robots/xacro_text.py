@@ -25,4 +25,6 @@ def expand_xacro(path: Path) -> str:
             return xacro.process_file(str(path)).toxml()
     except (Exception, SystemExit) as error:
         why = ' '.join(str(error).split()) or type(error).__name__
-        raise errors.Unreadable('', path.name, f'a xacro that expands: {why}') from None
+        raise errors.Unreadable('', path.name, f'a xacro that expands: {why} (for arguments '
+                                'without a default: xacro FILE NAME:=VALUE > robot.urdf, with its '
+                                'ROS packages sourced)') from None
