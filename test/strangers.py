@@ -114,9 +114,12 @@ def _examine(path: Path, row: Row) -> None:
 
 
 def _fall(written: str, row: Row) -> None:
-    doll, = {placement.doll for placement in load_scene(written).dolls}
-    row.bodies, row.mass, costs = len(doll.bones), doll.mass, []
-    with Simulation(above_ground(doll), accuracy='draft') as simulation:
+    scene = load_scene(written)
+    if len(scene.dolls) == 1:
+        scene = above_ground(scene.dolls[0].doll)
+    row.bodies, row.mass = len(scene.bones), sum(bone.mass for bone in scene.bones)
+    size, costs = max(placement.doll.extent for placement in scene.dolls), []
+    with Simulation(scene, accuracy='draft') as simulation:
         for _ in range(round(DURATION / simulation.step)):
             begun = time.process_time()
             state = simulation.advance()
@@ -130,7 +133,7 @@ def _fall(written: str, row: Row) -> None:
         measures = simulation.measures()
     busy = costs[1:round(BUSY / simulation.step)]
     row.ms_per_tick, row.slowest_ms = float(np.mean(busy)), float(np.max(busy))
-    row.energy_excess = measures['energy_excess_J'] / (9.8 * doll.mass * max(doll.extent, 0.4))
+    row.energy_excess = measures['energy_excess_J'] / (9.8 * row.mass * max(size, 0.4))
     row.joint_gap = measures['joint_gap_m']
     row.outcome = 'energy' if row.energy_excess > ENERGY_EXCESS else (
         'slow' if row.ms_per_tick > SLOW else 'falls')

@@ -15,7 +15,8 @@ ROLES = {
     'hips': 'mixamorig:Hips pelvis J_Bip_C_Hips Bip01_Pelvis b_Hip_01 CC_Base_Hip',
     'spine': 'mixamorig:Spine2 spine_03 J_Bip_C_UpperChest LowerBack spine05 torso_joint_3 thorax',
     'neck': 'mixamorig:Neck neck_01 neck01 J_Bip_C_Neck upperneck',
-    'head': 'mixamorig:Head head J_Bip_C_Head mixamorig:HeadTop_End Bip01_Head',
+    'head': 'mixamorig:Head head J_Bip_C_Head mixamorig:HeadTop_End Bip01_Head '
+            'snout Muzzle antler.L',
     'clavicle': 'clavicle_l clavicle.L L_Collar lclavicle L_Thorax Bip01_L_Clavicle',
     'upper_arm': 'upperarm_r upperarm01.R J_Bip_R_UpperArm rhumerus LeftArm left_shoulder '
                  'Bip01_R_UpperArm Skeleton_arm_joint_R',
@@ -23,11 +24,13 @@ ROLES = {
                'J_Bip_L_LowerArm',
     'hand': 'hand_l wrist.L LeftHand lhand L_Wrist',
     'thigh': 'thigh_l upperleg01.L LeftUpLeg lfemur L_Hip J_Bip_L_UpperLeg b_LeftLeg01_015',
-    'shin': 'calf_l lowerleg01.L ltibia L_Knee J_Bip_L_LowerLeg Bip01_L_Calf LeftShin',
-    'foot': 'foot_l foot.L LeftFoot lfoot L_Ankle',
+    'shin': 'calf_l lowerleg01.L ltibia L_Knee J_Bip_L_LowerLeg Bip01_L_Calf LeftShin '
+            'stifle.L Gaskin_R',
+    'foot': 'foot_l foot.L LeftFoot lfoot L_Ankle hock.L Metatarsus_l LeftTarsal',
     'toe': 'ball_l toe1-1.L LeftToeBase ltoes L_Toe',
-    'tail': 'Tail1 b_Tail01_012',
-    'soft': 'Ear.L hair3 jaw',
+    'tail': 'Tail1 b_Tail01_012 fluke_L Caudal_03',
+    'soft': 'Ear.L hair3 jaw mane_02 Mandible beak',
+    'wing': 'wing_01.L feather_R PectoralFin.L flipper_r dorsal_fin',
     None: 'Armature thing Bone.003 middle arm3 index'}
 
 
@@ -122,11 +125,17 @@ def test_role_of_a_bone_alone(role, name):
     ('leg_joint_L_1 leg_joint_L_2 leg_joint_L_3 leg_joint_L_5', 'thigh shin foot toe'),
     ('L_Collar L_Shoulder L_Elbow L_Wrist', 'clavicle upper_arm forearm hand'),
     ('hand_r index_01_r index_02_r', 'hand finger finger'),
+    ('femur_l stifle_l hock_l pastern_l hoof_l', 'thigh shin foot toe toe'),
+    ('scapula_l humerus_l radius_l carpus_l pastern_l', 'clavicle upper_arm forearm hand finger'),
+    ('BackThigh.L Gaskin.L Cannon.L Fetlock.L', 'thigh shin foot toe'),
+    ('Oberarm_L Unterarm_L Pfote_L Kralle_L', 'upper_arm forearm hand finger'),
+    ('thing_l claw_l', 'None None'),
     ('clavicle.L shoulder01.L upperarm01.L upperarm02.L lowerarm01.L',
      'clavicle clavicle upper_arm upper_arm forearm')])
 def test_roles_that_hang_on_the_bones_around(names, roles):
     names = tuple(names.split())
-    assert roles_of(names, tuple(range(-1, len(names) - 1))) == tuple(roles.split())
+    found = roles_of(names, tuple(range(-1, len(names) - 1)))
+    assert tuple(map(str, found)) == tuple(roles.split())
 
 
 @pytest.mark.parametrize(('name', 'side'), [

@@ -233,10 +233,38 @@ def test_a_loop_and_a_joint_to_the_world_are_named(tmp_path):
     [(placement, notes)] = read(
         tmp_path, '<model name="m">', link('a'), link('b', at='0 0 1'), link('c', at='0 1 1'),
         joint('ab', 'a', 'b'), joint('ac', 'a', 'c'), joint('bc', 'b', 'c'),
-        joint('pivot', 'world', 'a'), '</model>')
+        joint('again', 'a', 'b'), joint('pivot', 'world', 'a'), '</model>')
     assert [each.angle_names for each in placement.doll.joints] == [('ab',), ('ac',)]
     assert notes == ('bc: closes a loop, of which a doll has none: ignored',
+                     'again: closes a loop, of which a doll has none: ignored',
                      'pivot: a continuous joint to the world: ignored')
+
+
+def test_a_joint_whose_child_another_moves_moves_its_parent(tmp_path):
+    """As in PR2's grippers: a parallel link hangs on the tip of a finger, as its parent."""
+    [(placement, notes)] = read(
+        tmp_path, '<model name="m">', link('a'), link('b', at='0 0 1'), link('c', at='0 1 1'),
+        joint('ab', 'a', 'b'), joint('cb', 'c', 'b', more='<axis><xyz>1 0 0</xyz><limit><lower>-1'
+                                     '</lower><upper>2</upper></limit></axis>'), '</model>')
+    hinge = next(each for each in placement.doll.joints if each.child == 'c')
+    assert (hinge.parent, hinge.axes, hinge.anchor) == ('b', ((-1, 0, 0),), (0, 0, 1))
+    assert hinge.limits == (pytest.approx((-1, 2)),) and notes == ()
+
+
+def test_a_link_and_a_joint_may_have_one_name(tmp_path):
+    """Before SDF 1.7 they are not of one scope."""
+    [(placement, _)] = read(tmp_path, '<model name="m">', link('a'), link('b', at='0 0 1'),
+                            joint('b', 'a', 'b'), '</model>', version='1.4')
+    assert placement.doll.joints[0].anchor == (0, 0, 1)
+
+
+def test_a_point_mass_with_a_shape_is_a_solid(tmp_path):
+    """As Drake's poles, whose moments of 1e-20 stand for zero."""
+    tiny = ''.join(f'<{key}>1e-20</{key}>' for key in ('ixx', 'iyy', 'izz'))
+    [(placement, notes)] = read(tmp_path, '<model name="m">', link('a').replace(
+        '</mass>', f'</mass><inertia>{tiny}</inertia>'), '</model>')
+    assert placement.doll.root.inertia == pytest.approx((0.4 * 0.1 ** 2,) * 3)
+    assert notes == ('a: no body has its inertia: that of a uniform solid is used',)
 
 
 def test_a_joint_that_follows_another_is_named(tmp_path):

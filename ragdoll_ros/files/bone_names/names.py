@@ -43,6 +43,9 @@ def roles_of(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[str | No
         elif role == '?shoulder':
             # Mixamo and VRM call the collar bone shoulder, SMPL the upper arm.
             role = 'clavicle' if {'?arm', 'upper_arm', '?shoulder'} & set(below) else 'upper_arm'
+        elif role == '?segment':
+            limb = next((limb for limb in (ARM, LEG) if above in limb), None)
+            role = _next_segment(limb, above) if limb else None
         elif role == '?arm':
             role = _next_segment(ARM, above) if sided else None
         elif role == '?leg':

@@ -13,8 +13,8 @@ from ...model import errors, rotation
 from ...model.pose import Pose
 from .xml_text import parse_numbers
 
-FRAMED = ('link', 'joint', 'frame', 'model')
-"""Elements that define a frame of their name."""
+FRAMED = ('link', 'model', 'frame', 'joint')
+"""Elements that define a frame of their name: of equal names, as before SDF 1.7, the first ones."""
 
 OWN_FRAMES = ('', '__model__', 'world')
 """Names of the frame of the model or world itself."""
@@ -32,8 +32,10 @@ class SdfModel:
                  is_static: bool = False) -> None:
         self.element, self.prefix = element, prefix
         self.is_static = is_static or element.findtext('static', '').strip() in ('true', '1')
-        self.elements = {text_of(child, 'name', child.tag): child for child in element
-                         if child.tag in FRAMED}
+        self.elements: dict[str, ElementTree.Element] = {}
+        for tag in FRAMED:
+            for child in element.findall(tag):
+                self.elements.setdefault(text_of(child, 'name', tag), child)
         self.models = {name: SdfModel(child, f'{prefix}{name}::', self.is_static)
                        for name, child in self.elements.items() if child.tag == 'model'}
         self._poses: dict[str, Pose] = {}

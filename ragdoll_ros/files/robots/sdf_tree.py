@@ -5,7 +5,7 @@ sensors and plugins are not read. http://sdformat.org/spec
 """
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -100,16 +100,20 @@ def _models(scope: SdfModel, frame: Pose) -> Iterator[tuple[SdfModel, Pose]]:
 
 def _tree(name: str, links: dict[str, UrdfLink], poses: dict[str, Pose],
           joints: list[SdfJoint]) -> UrdfTree:
-    """Tree of links: of several joints of a link the first moves it.
+    """Tree of links: of several joints of a link the first moves it. Another one moves its own
+    parent, if nothing else does and that closes no loop.
 
     A joint of SDF turns about its own frame, one of URDF about its child's: a link without a shape
     is between.
     """
-    tree = UrdfTree(name, dict(links), {})
+    tree, held = UrdfTree(name, dict(links), {}), {joint.child for joint in joints}
     for joint in joints:
         if joint.child in tree.joints:
-            tree.left_out.append(joint.name)
-            continue
+            if joint.parent in (WORLD, *held, *_above(tree, joint.child)):
+                tree.left_out[joint.name] = joint.child
+                continue
+            joint = _reversed(joint)
+            held.add(joint.child)
         above, origin = joint.parent, poses[joint.parent].relative(joint.pose)
         for ending, axis in zip(('', '/2'), joint.axes, strict=False):
             turning = f'{joint.name}/joint{ending}'
@@ -127,6 +131,19 @@ def _tree(name: str, links: dict[str, UrdfLink], poses: dict[str, Pose],
     if lost := tree.links.keys() - set(tree.order):
         raise errors.JointCycle('joint', min(lost), 'joints that form no loop')
     return tree
+
+
+def _above(tree: UrdfTree, link: str) -> Iterator[str]:
+    """The links above one, from its parent to the root."""
+    while link in tree.joints:
+        link = tree.joints[link].parent
+        yield link
+
+
+def _reversed(joint: SdfJoint) -> SdfJoint:
+    """The joint with parent and child exchanged: the same angles are about the opposite axes."""
+    axes = [axis._replace(xyz=-axis.xyz) for axis in reversed(joint.axes)]
+    return replace(joint, parent=joint.child, child=joint.parent, axes=axes)
 
 
 def _fixed(parent: str, child: str, pose: Pose) -> UrdfJoint:

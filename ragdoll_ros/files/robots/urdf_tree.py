@@ -97,8 +97,8 @@ class UrdfTree:
     name: str
     links: dict[str, UrdfLink]
     joints: dict[str, UrdfJoint]
-    left_out: list[str] = field(default_factory=list)
-    """Names of joints that would close a loop: another one moves their child. URDF has none."""
+    left_out: dict[str, str] = field(default_factory=dict)
+    """Child of each joint that would close a loop, by its name. URDF has none."""
 
     @property
     def order(self) -> list[str]:

@@ -1,7 +1,8 @@
 """Fold direction of legged animals' joints: from the bend in the bind pose, else from the position.
 
-A knee folds backwards and the hock below it forwards; an elbow forwards and the wrist below it
-backwards. So for a straight leg the pair (hind or front) and the order within the leg decide.
+A knee (stifle) folds backwards and the hock below it forwards; an elbow forwards and the wrist
+(carpus) below it backwards. So for a straight leg the pair (hind or front) and the order within the
+leg decide. The fetlock above pastern and hoof folds backwards in both.
 """
 import math
 from dataclasses import dataclass
@@ -21,6 +22,13 @@ is plantigrade."""
 
 JOINT_ORDER = {'shin': 1, 'forearm': 1, 'foot': 2, 'hand': 2}
 """Index of a role's joint within its leg; the hip has index 0."""
+
+DIGITS = ('toe', 'finger')
+"""Roles of the bones below a fetlock."""
+
+DIGIT_FLEXION, DIGIT_EXTENSION = math.radians(80), math.radians(25)
+"""Rotation of a digit backwards from straight; forwards beyond straight, or beyond the bind pose
+where that is bent forwards already, as a standing horse's pasterns are."""
 
 MIN_STEEPNESS = 0.8
 """Smallest cosine of the angle between a leg and the vertical."""
@@ -51,6 +59,8 @@ def leg_fold(character: Character, groups: list[BodyGroup], index: int,
     """
     group, leg = groups[index], _leg(groups, index)
     above = parent_direction(character, groups, index)
+    if group.role in DIGITS:
+        return _digit_fold(character, groups, leg[0], above, along)
     named = group.role in JOINT_ORDER
     order = JOINT_ORDER.get(group.role, len(leg) - 1)
     if above is None or not (named or (
@@ -74,6 +84,17 @@ def leg_fold(character: Character, groups: list[BodyGroup], index: int,
     if expected is None:
         return None
     return Fold(expected, (0.0, MAX_FOLD + (bend if against else 0.0)), not named)
+
+
+def _digit_fold(character: Character, groups: list[BodyGroup], first: int,
+                above: np.ndarray | None, along: np.ndarray) -> Fold | None:
+    """Fold of a pastern, hoof or claw that points down, of an animal with front and hind legs."""
+    if above is None or along @ UP > -0.5 or _is_front(character, groups, first) is None:
+        return None
+    axis = np.cross(along, -FORWARD)
+    axis = axis / np.linalg.norm(axis)
+    bend = math.atan2(float(np.cross(above, along) @ axis), float(above @ along))
+    return Fold(axis, (-max(bend, 0.0) - DIGIT_EXTENSION, DIGIT_FLEXION - max(bend, 0.0)), False)
 
 
 def note_guesses(character: Character, groups: list[BodyGroup],

@@ -26,6 +26,18 @@ MIN_BIND_BEND, MAX_OVEREXTENSION = math.radians(35), math.radians(20)
 """Bend in the bind pose that shows the fold direction (paws are bound hyperextended); rotation
 past straight that is doubtful, and wrong beyond twice that."""
 
+LEG_FOLDS = {'shin': 1, 'forearm': 1, 'foot': 2, 'hand': 2}
+"""Order of a bone's joint in an animal's leg; that of the hip is 0."""
+
+HIP_ROLES = ('thigh', 'upper_arm')
+
+FOLDING_JOINTS = {(True, 1): 'an elbow', (True, 2): 'a wrist', (False, 1): 'a knee',
+                  (False, 2): 'a hock'}
+"""Names of the joints of front (True) and hind legs, by their order."""
+
+MIN_LEG_DISTANCE = 0.2
+"""Smallest distance between front and hind legs, as a fraction of the doll's size."""
+
 MIN_BMI, MAX_BMI = 10.0, 45.0
 """kg/m^2, mass over height squared: from infants and underweight to severe obesity."""
 
@@ -97,7 +109,7 @@ def _find_dense(doll: Ragdoll, most: float, impossible: float) -> list[Finding]:
 def _find_wrong_bends(doll: Ragdoll) -> list[Finding]:
     roles = doll_roles(doll)
     if not is_person(roles, np.array([bone.position for bone in doll.bones])):
-        return _find_overextension(doll)
+        return [*_find_overextension(doll), *_find_wrong_legs(doll, roles)]
     role_of = dict(zip((bone.name for bone in doll.bones), roles, strict=True))
     found = []
     for joint in doll.joints:
@@ -127,6 +139,38 @@ def _find_overextension(doll: Ragdoll) -> list[Finding]:
                 joint, f'a limb that goes {math.degrees(overextension):.0f} degrees past straight',
                 overextension > 2 * MAX_OVEREXTENSION or overextension > abs(bend) + high))
     return found
+
+
+def _find_wrong_legs(doll: Ragdoll, roles: Sequence[str | None]) -> list[Finding]:
+    """Hinges of an animal's front and hind legs that fold the way that those of no animal do.
+
+    A leg that the bind pose shows bent against that way is left to _find_overextension.
+    """
+    role_of = dict(zip((bone.name for bone in doll.bones), roles, strict=True))
+    joints = {joint.child: joint for joint in doll.joints}
+    hips = {name: _hip_of(joints, name, role_of) for name in joints if role_of[name] in LEG_FOLDS}
+    places = [joints[hip].anchor[0] for hip in hips.values() if hip]
+    if not places or max(places) - min(places) < MIN_LEG_DISTANCE * extent(doll):
+        return []
+    middle, found = (max(places) + min(places)) / 2, []
+    for name, hip in hips.items():
+        joint, order = joints[name], LEG_FOLDS[role_of[name] or '']
+        if not hip or joint.kind != 'hinge':
+            continue
+        is_front = joints[hip].anchor[0] > middle
+        sign = 1 if is_front == (order == 1) else -1
+        arm = np.subtract(doll.bone(name).position, joint.anchor)
+        if -arm[2] > 0.8 * np.linalg.norm(arm) and sign * _forward_motion(doll, joint) < -0.05:
+            part = FOLDING_JOINTS[is_front, order]
+            found.append(_joint_finding(joint, f'{part} that folds the wrong way', True))
+    return found
+
+
+def _hip_of(joints: dict[str, Joint], name: str, role_of: dict[str, str | None]) -> str:
+    """The bone of a limb whose joint is its hip or shoulder; '' where none has that role."""
+    while name in joints and role_of[name] not in HIP_ROLES:
+        name = joints[name].parent
+    return name if name in joints else ''
 
 
 def _joint_finding(joint: Joint, problem: str, wrong: bool) -> Finding:

@@ -32,6 +32,10 @@ ROUNDING = 1e-6
 """Relative rounding error of numbers with six digits."""
 
 
+POINT = 1e-6
+"""Share of a uniform solid's inertia below which one is that of a point: it gives a body a spin
+that grows without an end."""
+
 THINNEST = 1e-9
 """Least over largest moment of a body: a wire of 1 m and 0.05 mm. Rounding leaves less of zero."""
 
@@ -98,7 +102,7 @@ def make_bone(name: str, shapes: Sequence[PlacedShape], link: UrdfLink, frame: P
     else:
         pose = axes.compose(whole.in_frame(axes).principal_pose())
         bone = Bone(name, whole.in_frame(pose), mass, *pose)
-    if _is_physical(link):
+    if _is_physical(link) and np.trace(link.inertia) > POINT * np.sum(bone.inertia):
         return _with_inertia(bone, whole, axes, *_combine_inertias([(link, frame), *merged]))
     if link.inertia is not None:
         notes.append(f'{name}: no body has its inertia: that of a uniform solid is used')

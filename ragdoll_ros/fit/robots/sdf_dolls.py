@@ -92,7 +92,7 @@ def _common_model(names: Sequence[str]) -> str:
     return '::'.join(parts[0] for parts in shared)
 
 
-def _named_within(tree: UrdfTree, names: Sequence[str], model: str) -> tuple[dict, dict, list[str]]:
+def _named_within(tree: UrdfTree, names: Sequence[str], model: str) -> tuple[dict, dict, dict]:
     """Links, joints and joints that are left out of a part of a tree, without the model's name."""
     prefix = f'{model}::' if model else ''
 
@@ -104,7 +104,8 @@ def _named_within(tree: UrdfTree, names: Sequence[str], model: str) -> tuple[dic
         joint, name=short(joint.name), parent=short(joint.parent), child=short(name),
         mimics=joint.mimics and joint.mimics._replace(joint=short(joint.mimics.joint)))
         for name, joint in tree.joints.items() if name in names and joint.parent != WORLD}
-    return links, joints, [short(name) for name in tree.left_out if name.startswith(prefix)]
+    return links, joints, {short(name): short(child) for name, child in tree.left_out.items()
+                           if child in names}
 
 
 def _with_names(placements: Sequence[Placement]) -> list[Placement]:
