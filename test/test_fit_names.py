@@ -127,7 +127,7 @@ def test_role_of_a_bone_alone(role, name):
     ('hand_r index_01_r index_02_r', 'hand finger finger'),
     ('femur_l stifle_l hock_l pastern_l hoof_l', 'thigh shin foot toe toe'),
     ('scapula_l humerus_l radius_l carpus_l pastern_l', 'clavicle upper_arm forearm hand finger'),
-    ('BackThigh.L Gaskin.L Cannon.L Fetlock.L', 'thigh shin foot toe'),
+    ('BackThigh.L Gaskin.L Cannon.L BackFetlock.L', 'thigh shin foot toe'),
     ('Oberarm_L Unterarm_L Pfote_L Kralle_L', 'upper_arm forearm hand finger'),
     ('thing_l claw_l', 'None None'),
     ('clavicle.L shoulder01.L upperarm01.L upperarm02.L lowerarm01.L',
