@@ -84,7 +84,7 @@ def test_a_hock_that_folds_the_other_way_is_not_good(tmp_path):
 @pytest.mark.parametrize(('bone', 'part'), [
     ('Stifle', 'a knee'), ('Hock', 'a hock'), ('Radius', 'an elbow'), ('Carpus', 'a wrist')])
 def test_a_named_leg_that_folds_the_other_way_is_wrong(tmp_path, points, bone, part):
-    """Also where the bind pose is straight and both sides are alike, so that nothing else shows it."""
+    """Also where the bind pose is straight and both sides are alike: nothing else shows it."""
     fit = animal(tmp_path, points, 'anatomy')
     twin = dataclasses.replace(fit.doll, joints=tuple(
         dataclasses.replace(joint, limits=tuple((-high, -low) for low, high in joint.limits))

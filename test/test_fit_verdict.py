@@ -5,6 +5,7 @@ import re
 import fit_rigs
 import numpy as np
 import pytest
+import wild_rigs
 from fit_rigs import RIGS, fitted
 from test_fit_many import hairy
 
@@ -127,6 +128,13 @@ BREAKS = {
     heavy_head: PEOPLE}
 
 
+FIGURES = dict.fromkeys(
+    (end_on_the_root, rooted_in_a_limb, heavy_end, end_of_another_size, joint_a_metre_off,
+     body_half_a_metre_off, half_uncovered, in_centimetres, end_of_another_kind),
+    ('chibi-smooth', 'chibi-islands', 'monster_of_one_head-smooth', 'hopper-sharp'))
+"""Breaks of figures without a person's proportions, and their rigs in wild_rigs."""
+
+
 def test_right_dolls_are_called_good():
     """The rigs as they are: none is wrong but one in twenty, none doubtful but one more."""
     words = {name: judge(fitted(name).doll, fitted(name), falls=False).word for name in RIGS}
@@ -144,6 +152,16 @@ def test_a_broken_twin_is_not_called_good(broken, name):
     assert twin != fit.doll
     verdict = judge(twin, fit, falls=False)
     assert verdict.word != 'good'
+
+
+@pytest.mark.parametrize(('broken', 'name'), [
+    (broken, name) for broken, names in FIGURES.items() for name in names],
+    ids=lambda value: getattr(value, '__name__', value))
+def test_a_broken_figure_is_not_called_good(broken, name):
+    fit = wild_rigs.fitted(name)
+    twin = broken(fit.doll)
+    assert judge(fit.doll, fit, falls=False).word == 'good'
+    assert twin != fit.doll and judge(twin, fit, falls=False).word != 'good'
 
 
 @pytest.mark.slow

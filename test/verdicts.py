@@ -6,7 +6,7 @@ from collections import Counter
 
 import fit_rigs
 import wild_rigs
-from test_fit_verdict import BREAKS
+from test_fit_verdict import BREAKS, FIGURES
 
 from ragdoll_ros.fit.judging.verdict import judge
 
@@ -18,7 +18,9 @@ def main():
     fits += [wild_rigs.fitted(name) for name in wild_rigs.WILD]
     right = Counter(judge(fit.doll, fit, falls=False).word for fit in fits)
     broken = Counter(judge(broken(fit.doll), fit, falls=False).word
-                     for broken, names in BREAKS.items() for fit in map(fit_rigs.fitted, names))
+                     for broken, names in BREAKS.items()
+                     for fit in [*map(fit_rigs.fitted, names),
+                                 *map(wild_rigs.fitted, FIGURES.get(broken, ()))])
     print('| dolls | ' + ' | '.join(WORDS) + ' |\n| --- | --- | --- | --- |')
     for name, found in (('right', right), ('broken', broken)):
         print(f'| {found.total()} {name} | ' + ' | '.join(str(found[w]) for w in WORDS) + ' |')

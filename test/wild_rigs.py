@@ -16,7 +16,7 @@ from pathlib import Path
 
 import fit_rigs
 import numpy as np
-from fit_rigs import HALF, Bone, Rig, matrix
+from fit_rigs import HALF, Bone, Rig, limb, matrix
 
 BLEEDING = 0.4
 """Share of a bone in the skin of another: below one half, so that the skin stays the other's."""
@@ -255,6 +255,51 @@ def animal_rigs():
         snake, {bone.name: None for bone in snake}), snake, ('link4', 'link5', 'link6', 'link7')
 
 
+def chibi():
+    """A figure of two heads' height."""
+    hips, spine, neck, head, arm, leg, _ = fit_rigs.NAMES['mixamo']
+    bones = []
+    chest = limb(bones, -1, [hips, *spine], [(0, y, 0) for y in (.26, .32, .38, .43, .48)],
+                 [.09] * 4)
+    limb(bones, chest, [neck, head], [(0, .48, 0), (0, .58, 0), (0, 1.0, 0)], [.05, .22])
+    for side, mark in ((1, fit_rigs.LEFT), (-1, fit_rigs.RIGHT)):
+        limb(bones, chest, [name.format(**mark) for name in arm],
+             [(side * x, .45, 0) for x in (.03, .1, .2, .29, .36)], [.04, .04, .035, .035])
+        limb(bones, 0, [name.format(**mark) for name in leg], [(side * .06, y, z) for y, z in (
+            (.24, 0), (.15, .005), (.05, -.005), (.02, .05), (.02, .09))], [.05, .045, .04, .03])
+    return bones
+
+
+def monster():
+    """A head with arms and legs."""
+    bones = [Bone('Head', -1, (0, .35, 0), (0, .95, 0), .33)]
+    for side, label in ((1, 'Left'), (-1, 'Right')):
+        limb(bones, 0, [f'{label}{name}' for name in ('UpperArm', 'ForeArm', 'Hand')],
+             [(side * x, .6, 0) for x in (.3, .45, .6, .7)], [.05, .045, .04])
+        limb(bones, 0, [f'{label}{name}' for name in ('Thigh', 'Shin', 'Foot')],
+             [(side * .15, y, z) for y, z in ((.33, 0), (.2, .01), (.06, 0), (.02, .12))],
+             [.06, .05, .04])
+    return bones
+
+
+def hopper():
+    """A body and a larger head on two legs."""
+    bones = [Bone('Body', -1, (0, .3, 0), (0, .6, 0), .2)]
+    limb(bones, 0, ['Head'], [(0, .6, .05), (0, 1.1, .1)], [.3])
+    for side, label in ((1, 'Left'), (-1, 'Right')):
+        limb(bones, 0, [f'{label}{name}' for name in ('Thigh', 'Shin', 'Foot')],
+             [(side * .12, y, z) for y, z in ((.3, 0), (.18, .01), (.06, 0), (.02, .15))],
+             [.07, .06, .05])
+    return bones
+
+
+def figure_rigs():
+    """Name, bones and roots of figures that have not a person's proportions."""
+    yield 'chibi', chibi(), TRUNK
+    yield 'monster_of_one_head', monster(), ('Head',)
+    yield 'hopper', hopper(), ('Body',)
+
+
 def bleeding_rigs():
     """Name, bones, roots, and which bones move the skin of which others."""
     true, dog = person(), fit_rigs.quadruped()
@@ -288,6 +333,9 @@ def _wild():
     for name, bones, true, roots in animal_rigs():
         for skin in SKINS:
             yield Wild(Rig(f'{name}-{skin}', bones), skin, truth_of(true), roots)
+    for name, bones, roots in figure_rigs():
+        for skin in SKINS:
+            yield Wild(Rig(f'{name}-{skin}', bones), skin, truth_of(bones), roots)
     for name, bones, roots, bleeds in bleeding_rigs():
         for skin in SKINS:
             yield Wild(Rig(f'{name}-{skin}', bones), skin, truth_of(bones), roots, bleeds)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model import errors
 from ..reading.character import Character
-from ..roles.person import SEGMENTS, is_person, segment
+from ..roles.person import SEGMENTS, has_persons_proportions, is_person, segment
 from ..skeleton.groups import BodyGroup, mirrored_group
 
 WATER_DENSITY = 1000.0
@@ -28,15 +28,17 @@ def share_mass(total: float | None, sharing: str, character: Character, groups: 
 
     ``total`` is the mass of the doll, kg; None: the skin's volume times the density of water.
     ``sharing`` is 'volume' (of the skin), 'proportions' (of a person) or 'best': by volume, but
-    for a person the geometric mean of both, because skin weights change beside the joints, not at
-    them. A note reports an unusable skin volume. Raises NotPositive, NotFinite for a bad total.
+    for one of a person's proportions the geometric mean of both, because skin weights change
+    beside the joints, not at them. A note reports an unusable skin volume. Raises NotPositive,
+    NotFinite for a bad total.
     """
     volumes = _group_volumes(character, groups, np.array(shapes), notes)
     if total is None:
         total = WATER_DENSITY * float(volumes.sum())
     errors.check_positive('mass', total)
     roles = [group.role for group in groups]
-    person = is_person(roles, character.positions[[group.bone for group in groups]])
+    person = is_person(roles, character.positions[[group.bone for group in groups]]) and (
+        has_persons_proportions(roles, [group.name for group in groups], volumes.tolist()))
     shares = volumes
     if sharing == 'proportions' or (sharing == 'best' and person):
         shares = _anthropometric_shares(groups, volumes)

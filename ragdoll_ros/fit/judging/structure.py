@@ -34,6 +34,8 @@ LIMB_ROLES = {'upper_arm', 'forearm', 'hand', 'finger', 'thigh', 'shin', 'foot',
               'soft', 'clavicle'}
 """Roles of bodies that do not belong to the trunk."""
 
+TRUNK_ROLES = {'hips', 'spine'}
+
 
 def find_detached_joints(doll: Ragdoll, size: float) -> list[Finding]:
     """Joints whose anchor is too far from one of their bodies; ``size`` is the doll's, m."""
@@ -52,18 +54,22 @@ def find_wrong_root(doll: Ragdoll, roles: Sequence[str | None]) -> list[Finding]
     """A root outside the trunk: in a limb, or at the end of a tree that branches elsewhere."""
     root = doll.root.name
     role = dict(zip((bone.name for bone in doll.bones), roles, strict=True))[root]
-    if role in LIMB_ROLES and len(doll.bones) > 1:
+    # A monster may be all head.
+    is_trunk = role == 'head' and not TRUNK_ROLES & set(roles)
+    if role in LIMB_ROLES and not is_trunk and len(doll.bones) > 1:
         return [Finding(f'the root is {root}, a bone of the limbs', True)]
-    below = {bone.name: bone.mass for bone in doll.bones}
-    degrees = dict.fromkeys(below, 0)
+    # Without the head, which may be most of a figure and is no reason for a root beside it.
+    below = {bone.name: 0.0 if its == 'head' and bone.name != root else bone.mass
+             for bone, its in zip(doll.bones, roles, strict=True)}
+    degrees, whole = dict.fromkeys(below, 0), sum(below.values())
     for joint in reversed(doll.joints_from_root()):
         below[joint.parent] += below[joint.child]
         degrees[joint.parent] += 1
         degrees[joint.child] += 1
     most = max((below[joint.child] for joint in doll.joints if joint.parent == root), default=0.0)
-    if max(degrees.values()) > 2 and most > MAX_BRANCH_SHARE * doll.mass:
+    if max(degrees.values()) > 2 and most > MAX_BRANCH_SHARE * whole:
         return [Finding(f'the root {root} is at the end of the tree: one joint carries '
-                        f'{100 * most / doll.mass:.0f} % of the mass', degrees[root] == 1)]
+                        f'{100 * most / whole:.0f} % of the mass', degrees[root] == 1)]
     return []
 
 

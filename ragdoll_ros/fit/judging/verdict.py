@@ -6,7 +6,7 @@ import numpy as np
 from ...files.bone_names.names import doll_roles
 from ...model.ragdoll import Ragdoll
 from ..pipeline import Fit
-from ..roles.person import is_person
+from ..roles.person import has_persons_proportions, is_person
 from .coverage import find_uncovered
 from .drop_test import run_drop_test
 from .finding import Finding
@@ -45,7 +45,8 @@ def judge(doll: Ragdoll, fit: Fit | None = None, falls: bool = True,
         found += find_detached_joints(doll, size) + find_wrong_root(doll, roles)
         found += find_asymmetries(doll, size)
     positions = np.array([bone.position for bone in doll.bones])
-    if is_person(roles, positions) and not measured:
+    if not measured and is_person(roles, positions) and has_persons_proportions(
+            roles, [bone.name for bone in doll.bones], [bone.shape.volume for bone in doll.bones]):
         found += find_implausible_masses(doll, roles, size)
     if fit is not None:
         found += find_uncovered(doll, fit.character,

@@ -27,6 +27,10 @@ MAX_LEAN = 0.7
 """Largest horizontal over vertical offset of the head from the hips; quadrupeds exceed it."""
 
 
+MAX_HEAD_SHARE = 0.25
+"""Largest share of the volume in head and neck of a person, an infant's; a chibi's is larger."""
+
+
 def is_person(roles: Sequence[str | None], positions: np.ndarray) -> bool:
     """Whether bones of these roles at (n, 3) m, x forward, z up, form an upright person."""
     count = Counter(roles)
@@ -40,6 +44,16 @@ def is_person(roles: Sequence[str | None], positions: np.ndarray) -> bool:
     rise = middle('head', 'neck') - middle('thigh')
     return bool(rise[2] > 0 and np.linalg.norm(rise[:2]) < MAX_LEAN * rise[2]
                 and middle('shin')[2] < middle('thigh')[2])
+
+
+def has_persons_proportions(roles: Sequence[str | None], names: Sequence[str],
+                            volumes: Sequence[float]) -> bool:
+    """Whether bodies of a person with these volumes have the proportions of one: those of chibi
+    figures and of monsters that are mostly head have not.
+    """
+    head = sum(volume for role, name, volume in zip(roles, names, volumes, strict=True)
+               if segment(role, name)[0] == 'head')
+    return head <= MAX_HEAD_SHARE * sum(volumes)
 
 
 def segment(role: str | None, name: str) -> tuple[str, int]:

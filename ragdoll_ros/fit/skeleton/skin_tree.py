@@ -90,6 +90,8 @@ def _find_root(forest: SkinForest, source: str) -> int:
     halves = {bone for pair in forest.halves for bone in pair}
     single = [bone for bone in forest.skinned if bone in halves or (
         forest.mirrored[bone] == bone and not side_of(names[bone]))]
+    # However large: a figure may have most of its skin on the head.
+    single = [bone for bone in single if roles[bone] not in ('neck', 'head')] or single
     tops = [bone for bone in forest.skinned if forest.skinned_parents[bone] < 0]
     first = max(tops, key=lambda bone: forest.areas[bone], default=-1)
     if source == 'file' and first >= 0:
