@@ -31,7 +31,7 @@ def found(scene, groups=None):
     rows[:, 7:10] = [placement.velocity for placement in scene.dolls]
     count = len(rows)
     pairs = BroadPhase(scene, np.full(count, RADIUS)).pairs(
-        rows, AHEAD, np.ones(count, bool), np.arange(count) if groups is None else groups)
+        rows, AHEAD, *(np.ones(count, bool),) * 2, np.arange(count) if groups is None else groups)
     return {tuple(pair) for pair in pairs.tolist()}
 
 

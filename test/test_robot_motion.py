@@ -83,22 +83,16 @@ def yaw(row):
     return rotation.rotation_vector(row[3:7])[2]
 
 
-def test_links_are_where_mujoco_places_them(tmp_path):
+def assert_as_mujoco_places(found, place, lift=0.0, waist=0.0, thumb=0.0):
+    """The rows of the links of SKEW, whose frame is at a pose."""
     mujoco = pytest.importorskip('mujoco')
     model = mujoco.MjModel.from_xml_string(SKEW)
     data = mujoco.MjData(model)
-    values = {'lift': 0.4, 'waist': 2.5, 'thumb': 0.6}
-    for name, value in {**values, 'finger': -2 * 0.6 + 0.25}.items():
+    values = {'lift': lift, 'waist': waist, 'thumb': thumb, 'finger': -2 * thumb + 0.25}
+    for name, value in values.items():
         data.joint(name).qpos[0] = value
     mujoco.mj_kinematics(model, data)
-    place = Pose(np.array((1.0, 2.0, 3.0)), rotation.from_rpy(0.5, -0.2, 2.0))
-    with Simulation(robot(tmp_path, SKEW)) as simulation:
-        assert list(links(simulation)) == ['base', 'slide', 'arm', 'left', 'right']
-        for _ in range(2):
-            simulation.drive_body('arm', np.concatenate(place), joint_angles=values)
-            simulation.advance()
-        found = links(simulation)
-        assert simulation.body_pose('arm') == pytest.approx(np.concatenate(place), abs=1e-12)
+    assert list(found) == ['base', 'slide', 'arm', 'left', 'right']
     for name, row in found.items():
         # MuJoCo fuses the root with its world.
         theirs = Pose() if name == 'base' else Pose(
@@ -108,15 +102,27 @@ def test_links_are_where_mujoco_places_them(tmp_path):
         assert rotation.angle_between(row[3:7], expected.orientation) < 1e-9
 
 
+def test_links_are_where_mujoco_places_them(tmp_path):
+    values = {'lift': 0.4, 'waist': 2.5, 'thumb': 0.6}
+    place = Pose(np.array((1.0, 2.0, 3.0)), rotation.from_rpy(0.5, -0.2, 2.0))
+    with Simulation(robot(tmp_path, SKEW)) as simulation:
+        for _ in range(2):
+            simulation.drive_body('arm', np.concatenate(place), joint_angles=values)
+            simulation.advance()
+        assert simulation.body_pose('arm') == pytest.approx(np.concatenate(place), abs=1e-12)
+        assert_as_mujoco_places(links(simulation), place, **values)
+        # It follows what moves on within a tick.
+        turned = {'lift': 0.41, 'waist': 2.53, 'thumb': 0.55}
+        simulation.drive_body('arm', joint_angles=turned, rates={'waist': 2.0, 'thumb': -3.0})
+        simulation.run(3)
+        assert_as_mujoco_places(links(simulation), place, lift=0.41, waist=2.59, thumb=0.46)
+
+
 def test_at_the_start_links_are_at_the_angles_of_the_scene(tmp_path):
     made = robot(tmp_path, SKEW, ', position: [1, 2, 3], angles_deg: {thumb: 20, waist: -50}')
-    own, = made.robots
-    poses = own.link_poses(own.pose, own.start)
-    assert own.start == pytest.approx([0, math.radians(-50), math.radians(20)])
     with Simulation(made) as simulation:
-        for row, place, turn in zip(links(simulation).values(), *poses, strict=True):
-            assert row[:3] == pytest.approx(place, abs=1e-12)
-            assert rotation.angle_between(row[3:7], turn) < 1e-9
+        assert_as_mujoco_places(links(simulation), Pose(np.array((1.0, 2.0, 3.0))),
+                                waist=math.radians(-50), thumb=math.radians(20))
         before = simulation.state.rows[-5:].copy()
         # Orientations are normalised once.
         assert simulation.run(30)[-1, -5:] == pytest.approx(before, abs=1e-15)

@@ -883,11 +883,11 @@ class Simulation:
         loads: tuple[Wrenches, Springs, Drives] = (), self._springs, ()
         if self._follows:
             dolls, twists = self._driven.twists(self.time, end, self.state)
-            if dolls:
-                self._engine.set_twists(dolls, np.array(twists))
+            if len(dolls):
+                self._engine.set_twists(dolls, twists)
+                self.asleep = False
             loads = (), loads[1], self._driven.drives(self.time, self.state,
                                                       self._engine.sleeping)
-            self.asleep = bool(self._engine.sleeping.all())
         if self._pushes:
             loads = (self._pushes.wrenches(self.time, self.state), loads[1],
                      [*loads[2], *self._pushes.drives(self.time)])
@@ -937,10 +937,11 @@ class Simulation:
     def _put_to_sleep(self) -> None:
         """Put clusters to sleep that have been still for long enough and rest on the ground."""
         detector = self._sleep_detector
-        if self.asleep or not self.accuracy.sleep or detector.all_move(self._engine):
+        driven = self._driven.moving_bones(self.time) if self._follows else []
+        if self.asleep or not self.accuracy.sleep or detector.all_move(self._engine, driven):
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs),
-                  *(self._driven.moving_bones(self.time) if self._follows else ()),
+                  *driven,
                   *(self.scene.bone_slices[doll].start for doll in self._animations.kinematic))
         dolls = detector.find_ready(self._engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs

@@ -95,12 +95,14 @@ class SleepDetector:
         self._wait[dolls] = np.maximum(self._time, durations[dolls] * SECOND)
         self._bound[dolls] = self._grown(kinetic)[dolls]
 
-    def all_move(self, engine: Engine) -> bool:
-        """Whether no doll can be still, by its kinetic energy; if so, restarts all timers. For one
-        doll in motion a third of what find_ready() costs.
+    def all_move(self, engine: Engine, driven: list[int]) -> bool:
+        """Whether no doll can be still, by its kinetic energy, or as its bone is ``driven``; if so,
+        restarts all timers. For one doll in motion a third of what find_ready() costs.
         """
-        kinetic = engine.doll_totals.kinetic
-        if self._has_gravity and np.count_nonzero(kinetic <= self.max_kinetic):
+        still = engine.doll_totals.kinetic <= self.max_kinetic
+        if driven:
+            still[self._doll[driven]] = False
+        if self._has_gravity and np.count_nonzero(still):
             self._restarted = False
             return False
         if not self._restarted:

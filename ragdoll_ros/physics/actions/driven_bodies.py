@@ -7,11 +7,13 @@ pulled to it by a stiff drive, whose target velocity has a part in proportion to
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...model import errors, rotation
 from ...model.pose import Pose
+from ...model.robot import Robot
 from ...model.scene import SECOND, Scene
 from ...model.scene_change import SceneChange
 from ...model.state import State
@@ -28,7 +30,9 @@ from .body_motion import (
     checked_pose,
     checked_twist,
 )
-from .driven_robot import DrivenRobot
+
+if TYPE_CHECKING:
+    from .driven_robot import DrivenRobot
 
 DRIVE_TIME = 1e-3
 """s in which a drive without limits would take up a difference of velocity."""
@@ -141,7 +145,7 @@ class DrivenBodies:
 
     def __init__(self, scene: Scene, state: State) -> None:
         linked = scene.robot_of_body
-        self._robots = {robot.name: DrivenRobot(scene, robot) for robot in scene.robots}
+        self._robots = {robot.name: _driven_robot(scene, robot) for robot in scene.robots}
         self._set_bodies({placement.name: _Body(scene, doll, state)
                           for doll, placement in enumerate(scene.dolls)
                           if placement.follow and placement.name not in linked})
@@ -160,7 +164,7 @@ class DrivenBodies:
                 bodies[name] = body
         self._set_bodies(bodies)
         for robot in self._robots.values():
-            robot.find_links(change.after)
+            robot.change_scene(change.after)
 
     @property
     def jumps(self) -> int:
@@ -208,27 +212,28 @@ class DrivenBodies:
 
     def forget_twists(self) -> None:
         """The engine's twists are not those that were set: another state was restored."""
-        for body in (*self._exact, *self._robots.values()):
+        for body in self._exact:
             body.engine_twist = None
+        for robot in self._robots.values():
+            robot.forget_twists()
 
-    def twists(self, time: int, end: int,
-               state: State) -> tuple[list[int], list[tuple[float, ...]]]:
+    def twists(self, time: int, end: int, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Dolls (n,) that follow exactly and change their twists, and these (n, 6) until ``end``:
         m/s and rad/s.
         """
         dolls: list[int] = []
-        twists: list[tuple[float, ...]] = []
+        twists: list[np.ndarray] = []
         for body in self._exact:
             twist = body.twist(time, end)
             if body.engine_twist is None or not all(map(np.array_equal, twist, body.engine_twist)):
                 body.engine_twist = twist
                 dolls.append(body.doll)
-                twists.append((*twist[0].tolist(), *twist[1].tolist()))
-        for robot in self._robots.values():
-            more = robot.changed_twists(time, end, state)
-            dolls += more[0]
-            twists += more[1]
-        return dolls, twists
+                twists.append(np.concatenate(twist))
+        changed = [robot.changed_twists(time, end, state) for robot in self._robots.values()]
+        if dolls or len(changed) != 1:
+            changed.append((np.array(dolls, np.int64), np.array(twists).reshape(-1, 6)))
+        found, theirs = zip(*changed, strict=True)
+        return np.concatenate(found), np.concatenate(theirs)
 
     def drives(self, time: int, state: State, sleeping: np.ndarray) -> list[AppliedDrive]:
         """Drives of the bodies that give way; none of those that sleep where they stand."""
@@ -243,10 +248,19 @@ class DrivenBodies:
 
     def next_change(self, time: int, end: int) -> int:
         """Time, until ``end``, at which a motion changes."""
-        times = [at for body in self._bodies.values()
-                 for at in (body.motion.approach_end, body.motion.end)]
-        times += [at for robot in self._robots.values() for at in robot.changes]
-        return min((at for at in times if at > time), default=end)
+        for body in self._bodies.values():
+            for at in (body.motion.approach_end, body.motion.end):
+                if time < at < end:
+                    end = at
+        for robot in self._robots.values():
+            end = robot.next_change(time, end)
+        return end
+
+
+def _driven_robot(scene: Scene, robot: Robot) -> DrivenRobot:
+    # Imported here: its kernels are compiled, or loaded, where there is a robot.
+    from .driven_robot import DrivenRobot
+    return DrivenRobot(scene, robot)
 
 
 def _catch_up(missing: np.ndarray) -> np.ndarray:

@@ -267,10 +267,10 @@ class Engine(Protocol):
         its bones that overlap at new joint angles, as by set_coordinates().
         """
 
-    def set_twists(self, dolls: Sequence[int], twists: np.ndarray) -> None:
-        """Set the twists (n, 6), world frame, at which ``dolls`` that follow exactly move from now
-        on: velocity of the centre of mass, m/s, and angular velocity, rad/s; wake their clusters.
-        DRIVEN_BODIES.
+    def set_twists(self, dolls: np.ndarray, twists: np.ndarray) -> None:
+        """Set the twists (n, 6), world frame, at which ``dolls`` (n,) that follow exactly move from
+        now on: velocity of the centre of mass, m/s, and angular velocity, rad/s; wake their
+        clusters. DRIVEN_BODIES.
         """
 
     def set_kinematic(self, doll: int, kinematic: bool) -> None:

@@ -4,6 +4,8 @@ One tick of a cluster, and what its stages read and write:
 
     advance ── for each cluster: advance_cluster
       enable_separated_pairs     q, excluded -> excluded          pairs that overlapped at the start
+      integrate_positions        q, v -> q                        where all bodies move as told
+      or
       update_kinematics_and_gaps q, v -> kinematics, gaps         narrow phase
       follow_twist               q, gaps -> v                     what a kinematic body carries
       until the time is up:
@@ -44,8 +46,9 @@ from .compiling.cycles import cycles
 from .compiling.decorators import ADDRESS, REAL, compiled, entry
 from .contact.gaps import (enable_separated_pairs, label_reachable,
                            update_kinematics_and_gaps)
-from .dynamics.kinematics import (Kinematics, forward_kinematics, inertial_frame, put_quat,
-                                  root_position, velocity_at)
+from .dynamics.body import MOVED
+from .dynamics.kinematics import (Kinematics, forward_kinematics, inertial_frame,
+                                  integrate_positions, put_quat, root_position, velocity_at)
 from .flight.dense_step import begin_dense_step
 from .flight.first_contact import find_first_contact
 from .flight.flight import can_fly, follow_dense_step
@@ -104,6 +107,15 @@ def write_bone_states(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
 
 
 @compiled
+def all_moved(tree: np.ndarray) -> bool:
+    """Whether all bodies are MOVED, at constant velocities."""
+    moved = True
+    for i in range(len(tree)):
+        moved &= tree[i].kinematic == MOVED
+    return moved
+
+
+@compiled
 def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
     """Write the gaps at cluster.q to ws.gaps; step.end becomes the kinematics of q and v."""
     start_cycles = cycles()
@@ -142,7 +154,11 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     separated = enable_separated_pairs(s, ws, ws.step.end, q, v)
     if separated:
         dense.valid = dense.first_rate_known = 0
-    if separated or duration == 0.0:
+    if duration > 0.0 and all_moved(s.tree):
+        integrate_positions(s.tree, q, v, duration, q)
+        stats.gaps_current = stats.twist_changed = 0
+        time = duration
+    elif separated or duration == 0.0:
         refresh_gaps(s, ws, cluster)
     if duration > 0.0 and stats.twist_changed:
         refresh_gaps(s, ws, cluster)

@@ -2,7 +2,7 @@
 from .compiling.cache import alone
 
 with alone('rigid'):
-    from . import advance
+    from . import advance, links
     from .collision import aabb_tree, sweep_and_prune
 
-__all__ = ['aabb_tree', 'advance', 'sweep_and_prune']
+__all__ = ['aabb_tree', 'advance', 'links', 'sweep_and_prune']

@@ -17,17 +17,17 @@ class BroadPhase:
         self._dolls = sweep_and_prune.make_dolls(first, np.ascontiguousarray(reach), normal, offset)
         self._found = np.zeros((4 * len(scene.dolls), 2), np.int64)
 
-    def pairs(self, states: np.ndarray, ahead: float, moving: np.ndarray,
+    def pairs(self, states: np.ndarray, ahead: float, moving: np.ndarray, yielding: np.ndarray,
               clusters: np.ndarray) -> np.ndarray:
         """Pairs (k, 2) of dolls that may touch within ``ahead`` s, sorted, of which one or both are
-        ``moving`` (d,). ``states`` (n, 13) of all bones; ``clusters`` (d,): cluster index of each
-        doll.
+        ``moving`` (d,), and one or both ``yielding`` (d,). ``states`` (n, 13) of all bones;
+        ``clusters`` (d,): cluster index of each doll.
         """
-        count = sweep_and_prune.find_pairs(self._dolls, states, moving, clusters, ahead,
+        count = sweep_and_prune.find_pairs(self._dolls, states, moving, yielding, clusters, ahead,
                                            self._found)
         if count > len(self._found):
             self._found = np.zeros((2 * count, 2), np.int64)
-            return self.pairs(states, ahead, moving, clusters)
+            return self.pairs(states, ahead, moving, yielding, clusters)
         if not count:
             return NO_PAIRS
         found = self._found[:count]

@@ -17,7 +17,7 @@ from ...kernels.cluster_state import IMPACT, LEDGER, STEP_STATS, ClusterState, m
 from ...kernels.compiling.bundle import bind
 from ...kernels.contact_kind import LIMIT
 from ...kernels.dynamics.body import MOVED, WORLD
-from ...kernels.loaded import advance as kernels
+from ...kernels.loaded import advance as kernels, links
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, KINEMATIC, OVERLAPPING, System
 from ...kernels.workspace import Workspace, make_workspace
 from ..protocol import GROUND, Impacts
@@ -98,8 +98,8 @@ class Clusters:
                  like: Clusters | None = None) -> None:
         self._scene = scene
         self._systems, self._laws = _each_doll(scene, like)
-        self.kinematic = np.array([placement.is_kinematic for placement in scene.dolls])
-        """(d,) dolls that move at their velocities, whatever acts on them."""
+        self.yielding = np.array([not placement.is_kinematic for placement in scene.dolls])
+        """(d,) dolls that forces move; kinematic ones move at their velocities, whatever acts."""
         self.fixed_roots = np.array([placement.fixed_root for placement in scene.dolls])
         """(d,) dolls whose roots stay where they are."""
         self._q = [np.arange(own.start, own.stop) for own in layout.doll_q]
@@ -131,7 +131,9 @@ class Clusters:
         self._bone_of_body = np.concatenate([bones[trees[id(system)]] for system, bones in zip(
             self._systems, self._bones, strict=True)])
         """(n,) bones in the order of the dolls' trees."""
-        self._first = np.array([own.start for own in scene.bone_slices])
+        self._first, self._first_q, self._first_v = (
+            np.array([own.start for own in slices])
+            for slices in (scene.bone_slices, layout.doll_q, layout.doll_v))
         self._effort = np.zeros(len(scene.dolls), np.int64)
         self._singles = [self._single(doll) for doll in range(len(scene.dolls))]
         self.members = list(self._singles)
@@ -216,7 +218,7 @@ class Clusters:
         """Set the velocities of ``dolls`` (d,), whole clusters, to those in ``velocities``, but for
         those of kinematic ones and of fixed roots.
         """
-        own = (dolls & ~self.kinematic)[self._doll_of_v] & ~self._fixed_v
+        own = (dolls & self.yielding)[self._doll_of_v] & ~self._fixed_v
         self.v[own] = velocities[own]
         self._states.arrays['dense_step'][dolls] = 0
         for cluster in self._joined:
@@ -224,14 +226,17 @@ class Clusters:
                 cluster.state.v[:] = self.v[cluster.v_indices]
                 cluster.state.dense_step[:] = 0
 
-    def use_twists(self, dolls: Sequence[int]) -> None:
-        """Let the clusters of ``dolls``, whose ``v`` were set, go on with these; their contacts are
-        kept.
+    def set_twists(self, dolls: np.ndarray, twists: np.ndarray) -> None:
+        """Set the twists (m, 6), world frame, of kinematic ``dolls`` (m,) of one bone; the contacts
+        of their clusters are kept.
         """
-        for place in dict.fromkeys(self.of_doll[dolls].tolist()):
+        links.set_twists(self.q, self.v, self.bone_states, self._first_q, self._first_v,
+                         self._first, dolls, twists)
+        for place in set(self.of_doll[dolls].tolist()):
             cluster = self.members[place]
-            cluster.state.v[:] = self.v[cluster.v_indices]
-            cluster.state.dense_step[:] = 0
+            if not self._is_single(cluster):
+                cluster.state.v[:] = self.v[cluster.v_indices]
+                cluster.state.dense_step[:] = 0
 
     def set_motion(self, dolls: Sequence[int], q: np.ndarray, v: np.ndarray) -> None:
         """Set the coordinates and velocities of kinematic dolls to their own in those of the scene
@@ -250,7 +255,7 @@ class Clusters:
         with itself, its limits and the ground while it does; what overlaps of it then does not
         collide until it separates.
         """
-        self.kinematic[doll] = kinematic
+        self.yielding[doll] = not kinematic
         cluster, single = self.members[self.of_doll[doll]], self._singles[doll]
         for one in {id(each): each for each in (single, cluster)}.values():
             system, place = one.system, int(np.searchsorted(one.dolls, doll))
@@ -263,9 +268,9 @@ class Clusters:
                 excluded & ~KINEMATIC | OVERLAPPING | JOINT_OUTSIDE_LIMITS)
             _invalidate(one)
 
-    def follow_twist(self, doll: int) -> None:
-        """Mark that the twist of a doll was set: its contacts take the new one."""
-        self.members[self.of_doll[doll]].state.stats['twist_changed'] = 1
+    def follow_twists(self, dolls: list[int]) -> None:
+        """Mark that the twists of dolls were set: their contacts take the new ones."""
+        self.stats['twist_changed'][self._firsts[self.of_doll[dolls]]] = 1
 
     def set_doll(self, doll: int, q: np.ndarray, v: np.ndarray) -> None:
         """Set the coordinates and velocities of a doll to its own in those of the scene (nq,),
@@ -289,8 +294,8 @@ class Clusters:
 
     def exclude(self, flags: list[np.ndarray]) -> None:
         """Set the exclusion flags (p,) of each doll's pairs of geoms; see kernels/system.py."""
-        for cluster, own, kinematic in zip(self._singles, flags, self.kinematic, strict=True):
-            cluster.state.excluded[:] = own | KINEMATIC * kinematic
+        for cluster, own, yields in zip(self._singles, flags, self.yielding, strict=True):
+            cluster.state.excluded[:] = own | KINEMATIC * (not yields)
 
     def exclude_overlaps(self, doll: int) -> None:
         """Exclude those pairs of geoms of a doll that overlap in its next state, until they

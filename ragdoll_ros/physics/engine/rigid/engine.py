@@ -67,7 +67,6 @@ class RigidEngine:
         for doll, placement in enumerate(scene.dolls):
             if placement.is_animated:
                 self._clusters.set_kinematic(doll, True)
-        self._some_kinematic = bool(self._kinematic.any())
         self._twisted: list[int] = []
         """Dolls whose twist has been set since the last interval."""
         self.sleeping = np.zeros(len(scene.dolls), bool)
@@ -81,9 +80,9 @@ class RigidEngine:
         self._initial_overlaps = self._clusters.excluded(OVERLAPPING)
 
     @property
-    def _kinematic(self) -> np.ndarray:
-        """(d,) dolls that move at their velocities, whatever acts on them."""
-        return self._clusters.kinematic
+    def _yielding(self) -> np.ndarray:
+        """(d,) dolls that forces move; all others are kinematic."""
+        return self._clusters.yielding
 
     @property
     def state(self) -> State:
@@ -142,16 +141,11 @@ class RigidEngine:
         self._last_start = None
         clusters.add_work(self.doll_totals.energy - before)
 
-    def set_twists(self, dolls: Sequence[int], twists: np.ndarray) -> None:
-        own = self._in_clusters_of(dolls)
-        self._wake(own)
-        axes = rotation.inverse(self._clusters.q[self.layout.root_orientations[dolls]])
-        self._clusters.v[self.layout.root_velocities[dolls]] = twists[:, :3]
-        self._clusters.v[self._spins[dolls]] = rotation.rotate(axes, twists[:, 3:])
-        self._clusters.use_twists(dolls)
-        self._clusters.advance(0.0, self.accuracy, ~own)
+    def set_twists(self, dolls: np.ndarray, twists: np.ndarray) -> None:
+        self._wake(self._in_clusters_of(dolls))
+        self._clusters.set_twists(dolls, twists)
         self._update_state()
-        self._twisted += dolls
+        self._twisted += dolls.tolist()
 
     def _in_clusters_of(self, dolls: Sequence[int]) -> np.ndarray:
         """Which dolls (d,) are in the clusters of some."""
@@ -171,7 +165,6 @@ class RigidEngine:
         own = self.cluster_of_doll == self.cluster_of_doll[doll]
         self._wake(own)
         self._clusters.set_kinematic(doll, kinematic)
-        self._some_kinematic = bool(self._kinematic.any())
         self._age[own] = MAX_AGE
         self._last_start = None
 
@@ -250,7 +243,7 @@ class RigidEngine:
         found = np.zeros(len(self.scene.dolls), bool)
         on = (bones[:, 1] == GROUND) & (contacts['impulse'][:, 0] > 0)
         found[self.scene.doll_of_bone[bones[on, 0]]] = True
-        return found | self._kinematic | self._clusters.fixed_roots
+        return found | ~self._yielding | self._clusters.fixed_roots
 
     def contacts(self) -> Contacts:
         found, touching, dt = self._clusters.contacts()
@@ -330,10 +323,8 @@ class RigidEngine:
         """
         clusters = self._clusters
         pairs = self._pairs_to_form(duration) if len(self.scene.dolls) > 1 else None
-        moving = ~self.sleeping
-        if self._some_kinematic:
-            moving &= ~self._kinematic
-        found_others = clusters.static_geoms.update(clusters.bone_states, duration, moving)
+        found_others = clusters.static_geoms.update(clusters.bone_states, duration,
+                                                    ~self.sleeping & self._yielding)
         if pairs is not None:
             clusters.form(pairs)
         elif found_others:
@@ -348,7 +339,8 @@ class RigidEngine:
         near = self._near_pairs(duration)
         self._age += 1
         stale = clusters.have_pairs & (self._age > MAX_AGE)
-        stale[near[~clusters.knows(near) | self.sleeping[near].any(axis=1)]] = True
+        if len(near):
+            stale[near[~clusters.knows(near) | self.sleeping[near].any(axis=1)]] = True
         if not np.count_nonzero(stale):
             return None
         while True:
@@ -369,18 +361,17 @@ class RigidEngine:
 
     def _near_pairs(self, ahead: float) -> np.ndarray:
         """Pairs (k, 2) of dolls that may touch within ``ahead`` s, one of each awake."""
-        found = self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
-                                        self.cluster_of_doll)
         # Bodies that do not yield have no contacts with each other.
-        return found[~self._kinematic[found].all(axis=1)] if self._some_kinematic else found
+        return self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
+                                       self._yielding, self.cluster_of_doll)
 
     def _advance(self, duration: float, actions: tuple[Wrenches, Springs, Drives],
-                 accuracy: Accuracy, twisted: Iterable[int]) -> None:
+                 accuracy: Accuracy, twisted: list[int]) -> None:
         """Advance all clusters that are awake under ``actions``, then remove these. Twists of the
         dolls ``twisted`` have been set.
         """
-        for doll in twisted:
-            self._clusters.follow_twist(doll)
+        if twisted:
+            self._clusters.follow_twists(twisted)
         acted = self._apply_actions(actions) if any(actions) else ()
         self._clusters.advance(duration, accuracy, self.sleeping)
         for cluster in acted:
@@ -398,7 +389,7 @@ class RigidEngine:
         for kind, given in enumerate(actions):
             for one in given:
                 doll = self.scene.doll_of_bone[one.bone]
-                if self._kinematic[doll]:
+                if not self._yielding[doll]:
                     continue
                 place = int(self._clusters.of_doll[doll])
                 acts.setdefault(place, ([], [], []))[kind].append(one)
@@ -430,8 +421,8 @@ class RigidEngine:
             return
         depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
-        sunk = (depths > allowed_penetration(self.scene)) & ~(
-            self._kinematic | self._clusters.fixed_roots)
+        sunk = (depths > allowed_penetration(self.scene)) & self._yielding & (
+            ~self._clusters.fixed_roots)
         for doll in (doll for doll in dolls if sunk[doll]):
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)

@@ -57,7 +57,7 @@ def _depths(scene: Scene, clusters: Clusters, broad_phase: BroadPhase,
     clusters.advance(0.0, DRAFT, ~everything)
     states = clusters.bone_states
     clusters.static_geoms.update(states, 0.0, everything)
-    clusters.form(broad_phase.pairs(states, 0.0, everything, clusters.of_doll))
+    clusters.form(broad_phase.pairs(states, 0.0, everything, everything, clusters.of_doll))
     clusters.advance(0.0, DRAFT, ~everything)
     deepest: dict[Pair, float] = {}
     for pair, depth in _overlapping(scene, clusters):

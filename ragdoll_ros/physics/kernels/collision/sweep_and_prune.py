@@ -142,12 +142,13 @@ STATES, MASK, INDICES, PAIRS = (type_like(each) for each in (
     np.zeros((0, 13)), np.zeros(0, bool), np.zeros(0, np.int64), np.zeros((0, 2), np.int64)))
 
 
-@entry(DOLLS, STATES, MASK, INDICES, type_like(0.0), PAIRS)
-def find_pairs(dolls: Dolls, states: np.ndarray, moving: np.ndarray, clusters: np.ndarray,
-               ahead: float, pairs: np.ndarray) -> int:
+@entry(DOLLS, STATES, MASK, MASK, INDICES, type_like(0.0), PAIRS)
+def find_pairs(dolls: Dolls, states: np.ndarray, moving: np.ndarray, yielding: np.ndarray,
+               clusters: np.ndarray, ahead: float, pairs: np.ndarray) -> int:
     """Write to ``pairs`` (k, 2) the dolls that may touch within ``ahead`` s, of which one or both
-    are ``moving`` (d,), the lower index first. Returns how many there are, also if k are fewer.
-    ``states`` (n, 13) of all bones; ``clusters`` (d,): cluster index of each doll.
+    are ``moving`` (d,), and one or both ``yielding`` (d,), the lower index first. Returns how many
+    there are, also if k are fewer. ``states`` (n, 13) of all bones; ``clusters`` (d,): cluster
+    index of each doll.
     """
     set_spheres(dolls, states, clusters, IMPACT_SPEEDUP * ahead)
     spheres, order, count, widest = dolls.spheres, dolls.order, 0, 0.0
@@ -162,7 +163,8 @@ def find_pairs(dolls: Dolls, states: np.ndarray, moving: np.ndarray, clusters: n
             b = order[e]
             if spheres[b].center[0] > far:
                 break
-            if (moving[a] or moving[b]) and may_touch(dolls, states, a, b):
+            if (moving[a] or moving[b]) and (yielding[a] or yielding[b]) and (
+                    may_touch(dolls, states, a, b)):
                 if count < len(pairs):
                     pairs[count] = min(a, b), max(a, b)
                 count += 1
