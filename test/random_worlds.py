@@ -1,6 +1,6 @@
 """Random worlds, reproducible: the default doll falls over bodies of all kinds; and what is bad.
 
-`python test/random_worlds.py --falls 10008` tells of so many.
+`python test/random_worlds.py --starts 10008` tells of so many.
 """
 from __future__ import annotations
 
@@ -40,8 +40,11 @@ EXCESS = 1e-5
 DEEPEST = 1e-3
 """m, on the way and at the end, as on the ground."""
 
+FARTHEST = math.radians(0.2)
+"""rad that a joint may be past a limit, as in the report's 10 008 starts."""
+
 EVERY = 10
-"""Ticks from one look at depths to the next."""
+"""Ticks from one look at depths and limits to the next."""
 
 MATERIALS = [Material(friction, 0.0, restitution) for friction in (0.0, 0.3, 0.8, math.inf)
              for restitution in (0.0, 0.3, 0.7)]
@@ -146,33 +149,38 @@ class Figures:
     """In what, and when."""
     end_depth: float
     """m: the same at the end."""
+    overshoot: float
+    """rad: farthest that a joint was past a limit."""
     overlaps: bool
     """Whether the doll begins in something: such a world is none."""
 
     @property
     def is_bad(self) -> bool:
-        """Whether energy came from nothing, or something was passed."""
+        """Whether energy came from nothing, or something was passed, or a limit."""
         return not self.overlaps and not (self.excess <= EXCESS
-                                          and max(self.depth, self.end_depth) <= DEEPEST)
+                                          and max(self.depth, self.end_depth) <= DEEPEST
+                                          and self.overshoot <= FARTHEST)
 
 
 def fall(number: int, accuracy: str = 'normal') -> Figures:
     """The fall in world ``number``."""
     scene = world(number)
-    deepest, where = 0.0, ''
+    deepest, where, overshoot = 0.0, '', 0.0
     with Simulation(scene, accuracy=accuracy, engine='rigid') as simulation:
         overlaps = bool(simulation.initial_overlaps)
         for tick in range(round(SECONDS / scene.step)):
             state = simulation.advance()
             if not np.isfinite(state.rows).all():
-                return Figures(math.inf, deepest, where, math.inf, overlaps)
+                return Figures(math.inf, deepest, where, math.inf, math.inf, overlaps)
             if tick % EVERY == 0:
                 depth, body = deepest_in_bodies(scene, state)
                 if depth > deepest:
                     deepest, where = depth, f'{body} at {tick / 100:.2f} s'
+                overshoot = max(overshoot, simulation.measures()['limit_overshoot_rad'])
         excess = simulation.measures()['energy_excess_J']
     own = scene.dolls[0].doll.mass * 9.8 * scene.dolls[0].position[2]
-    return Figures(excess / own, deepest, where, deepest_in_bodies(scene, state)[0], overlaps)
+    return Figures(excess / own, deepest, where, deepest_in_bodies(scene, state)[0],
+                   overshoot, overlaps)
 
 
 def deepest_in_bodies(scene: Scene, state) -> tuple[float, str]:
@@ -233,13 +241,14 @@ def main() -> int:
     """Run the command; 1 if a fall is bad."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--falls', type=int, default=1000, help='number of worlds')
+    parser.add_argument('--starts', type=int, default=1000, metavar='N',
+                        help='number of worlds (1000)')
     parser.add_argument('--first', type=int, default=0, help='number of the first one')
     parser.add_argument('--accuracy', default='normal', choices=('draft', 'normal', 'exact'))
     options = parser.parse_args()
     good = overlapping = 0
-    deepest, excess, bad = 0.0, -math.inf, 0
-    for number in range(options.first, options.first + options.falls):
+    deepest, overshoot, excess, bad = 0.0, 0.0, -math.inf, 0
+    for number in range(options.first, options.first + options.starts):
         found = fall(number, options.accuracy)
         if found.is_bad:
             bad += 1
@@ -249,9 +258,11 @@ def main() -> int:
         else:
             good += 1
             deepest = max(deepest, found.depth, found.end_depth)
+            overshoot = max(overshoot, found.overshoot)
             excess = max(excess, found.excess)
-    print(f'{bad} bad; {good} good, at most {1e3 * deepest:.3f} mm deep, {excess:.1e} of the '
-          f'energy from nothing; {overlapping} began in a body')
+    print(f'{bad} bad; {good} good, at most {1e3 * deepest:.3f} mm deep, '
+          f'{math.degrees(overshoot):.3f} degrees past a limit, {excess:.1e} of the energy from '
+          f'nothing; {overlapping} began in a body')
     return bad > 0
 
 

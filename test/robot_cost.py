@@ -32,26 +32,29 @@ URDF = '<robot name="arm">{}{}</robot>'.format(
             for k in range(1, LINKS)))
 """An arm that stands upright, whose joints turn about x and y by turns."""
 
-CASES = {'doll alone': (None, 0), 'robot of static bodies': ('{}', 0),
+ALONE, EACH_TICK = 'doll alone', 'told each tick'
+CASES = {ALONE: (None, 0), 'robot of static bodies': ('', 0),
          'robot that follows, never told': (', follow: exact', 0),
-         'told at 50 Hz': (', follow: exact', 2), 'told each tick, 100 Hz': (', follow: exact', 1)}
+         'told every other tick': (', follow: exact', 2), EACH_TICK: (', follow: exact', 1)}
 """What the scene's robot has, and every how many ticks it is told."""
+
+COMMANDS = [tuple({name: scale * wave(0.02 * tick + k) for k, name in enumerate(NAMES)}
+                  for scale, wave in ((0.3, math.sin), (0.6, math.cos))) for tick in range(TICKS)]
+"""Joint angles and rates of each tick."""
 
 
 def scene(folder: Path, robot: str | None, distance: float) -> Scene:
     """The scene drop, with the robot so many m beside the doll."""
+    drop = load_scene('drop')
+    if robot is None:
+        return drop
     (folder / 'arm.urdf').write_text(URDF)
-    entry = '' if robot is None else (
-        f'bodies: [{{name: arm, urdf: arm.urdf, position: [{distance}, 0, 0]{robot.strip("{}")}}}]')
-    (folder / 'scene.yaml').write_text(f'ground: {{}}\ndolls: [{{doll: doll}}]\n{entry}\n')
+    (folder / 'scene.yaml').write_text(
+        'ground: {}\ndolls: [{doll: doll}]\nbodies:\n'
+        f'  - {{name: arm, urdf: arm.urdf, position: [{distance}, 0, 0]{robot}}}\n')
     made = load_scene(str(folder / 'scene.yaml'))
-    return dataclasses.replace(load_scene('drop'), bodies=made.bodies, robots=made.robots,
-                               dolls=(*load_scene('drop').dolls, *made.dolls[1:]))
-
-
-COMMANDS = [tuple({name: scale * wave(2 * 0.01 * tick + k) for k, name in enumerate(NAMES)}
-                  for scale, wave in ((0.3, math.sin), (0.6, math.cos))) for tick in range(TICKS)]
-"""Joint angles and rates of each tick."""
+    return dataclasses.replace(drop, bodies=made.bodies, robots=made.robots,
+                               dolls=(*drop.dolls, *made.dolls[1:]))
 
 
 def cost(simulation: Simulation, every: int) -> float:
@@ -65,24 +68,24 @@ def cost(simulation: Simulation, every: int) -> float:
     return (time.process_time() - begun) / TICKS
 
 
-def main() -> None:
+def costs(distance: float = 3.0, accuracy: str = 'normal') -> dict[str, float]:
+    """CPU time of a tick of each case, s, the least of several runs in turn."""
+    with tempfile.TemporaryDirectory() as folder:
+        each = {name: (Simulation(scene(Path(folder), robot, distance), accuracy=accuracy), every)
+                for name, (robot, every) in CASES.items()}
+        least = dict.fromkeys(each, math.inf)
+        for _ in range(RUNS):
+            for name, (simulation, every) in each.items():
+                least[name] = min(least[name], cost(simulation, every))
+        return least
+
+
+if __name__ == '__main__':
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--distance', type=float, default=3.0,
                         help='of the robot from the doll, m (default 3: out of its reach)')
     parser.add_argument('--accuracy', choices=list(ACCURACIES), default='normal')
-    options = parser.parse_args()
-    awake = dataclasses.replace(ACCURACIES[options.accuracy], sleep=True)
-    with tempfile.TemporaryDirectory() as folder:
-        each = {name: (Simulation(scene(Path(folder), robot, options.distance), accuracy=awake),
-                       every) for name, (robot, every) in CASES.items()}
-        least = dict.fromkeys(each, math.inf)
-        for _ in range(RUNS):
-            for name, (simulation, every) in each.items():
-                least[name] = min(least[name], cost(simulation, every))
-    for name, seconds in least.items():
-        print(f'{1e6 * seconds:7.1f} us  {seconds / least["doll alone"]:5.2f}  {name}')
-
-
-if __name__ == '__main__':
-    main()
+    found = costs(**vars(parser.parse_args()))
+    for name, seconds in found.items():
+        print(f'{1e6 * seconds:7.1f} us  {seconds / found[ALONE]:5.2f}  {name}')

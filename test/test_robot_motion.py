@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from robot_cost import ALONE, EACH_TICK, costs
 from test_driven_motion import assert_repeated
 from test_robot_bodies import refusal, scene
 
@@ -296,6 +297,12 @@ def test_dolls_come_and_go_while_it_moves(tmp_path):
         simulation.go_back(here)
         # A new engine, and the same motion.
         assert simulation.run(5) == pytest.approx(ahead, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_robot_of_8_links_that_moves_costs_at_most_half_a_doll():
+    found = costs()
+    assert found[EACH_TICK] / found[ALONE] <= 1.5, found
 
 
 def test_a_scene_with_robots_is_written_and_read(tmp_path):

@@ -44,7 +44,7 @@ what a user would write without this package: it shares no code with it."""
 FLOORS = {
     'physics.kernels': ('compiling', 'maths', 'contact_kind', 'dynamics', 'system',
                         'cluster_state', 'collision', 'workspace', 'contact', 'impulses',
-                        'stepping', 'flight', 'swing', 'advance', 'loaded', '__main__'),
+                        'stepping', 'flight', 'swing', 'links', 'advance', 'loaded', '__main__'),
     'fit': ('roles', 'shapes', 'reading', 'skeleton', 'bodies', 'joints', 'robots', 'skin',
             'pipeline', 'judging', 'report', 'picture', 'command')}
 """Of a room: each stands on those before it."""

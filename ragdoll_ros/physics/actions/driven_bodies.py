@@ -230,8 +230,9 @@ class DrivenBodies:
                 dolls.append(body.doll)
                 twists.append(np.concatenate(twist))
         changed = [robot.changed_twists(time, end, state) for robot in self._robots.values()]
-        if dolls or len(changed) != 1:
-            changed.append((np.array(dolls, np.int64), np.array(twists).reshape(-1, 6)))
+        if len(changed) == 1 and not dolls:
+            return changed[0]
+        changed.append((np.array(dolls, np.int64), np.array(twists).reshape(-1, 6)))
         found, theirs = zip(*changed, strict=True)
         return np.concatenate(found), np.concatenate(theirs)
 

@@ -144,8 +144,10 @@ class DrivenRobot:
         links = self._links
         if self.moves(time):
             self._stands = False
-            kernels.change_twists(self._address, np.concatenate(self._frame.at(end)), time, end,
-                                  state.rows)
+            count = kernels.change_twists(self._address, np.concatenate(self._frame.at(end)), time,
+                                          end, state.rows)
+            if count == len(self.dolls):
+                return self.dolls, links.twists
         elif self._stands:
             return NO_TWISTS
         else:

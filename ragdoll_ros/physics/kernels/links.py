@@ -87,8 +87,9 @@ def arrival(motion: np.record) -> int:
 @compiled
 def place_links(links: Links, frame: np.ndarray, time: int) -> None:
     """Write the poses of all links at ``time``, when the robot's ``frame`` is at a pose (7,)."""
+    root = links.frames[0]
     for k in range(7):
-        links.frames[0, k] = frame[k]
+        root[k] = frame[k]
     for i in range(len(links.joints)):
         joint, value = links.joints[i], 0.0
         if joint.leader >= 0:
@@ -140,17 +141,17 @@ def tell_joints(address: int, frame: np.ndarray, told: np.ndarray, time: int, ar
     Returns whether it jumps, whether one of these joints was told before, and the time from which
     on all joints stand.
     """
-    links, told_before, farthest, last = links_at(address), False, 0.0, NEVER
-    motions = links.motions
+    links, told_before, farthest, latest = links_at(address), False, 0.0, NEVER
+    motions, values, rates = links.motions, told[0], told[1]
     for k in range(len(motions)):
-        motion, value, rate = motions[k], told[0, k], told[1, k]
+        motion, value, rate = motions[k], values[k], rates[k]
         if math.isnan(value) and math.isnan(rate):
             continue
         begin = value_at(motion, time)
         if math.isnan(value):
             value = begin
         elif motion.continuous:
-            # It takes the shorter way.
+            # It turns the shorter way.
             begin += math.floor((value - begin) / (2 * math.pi) + 0.5) * 2 * math.pi
         told_before |= motion.told != 0
         motion.begin, motion.value, motion.since, motion.end = begin, value, time, end
@@ -158,13 +159,13 @@ def tell_joints(address: int, frame: np.ndarray, told: np.ndarray, time: int, ar
         motion.approach_end, motion.told = NEVER, 1
     place_links(links, frame, time)
     for link in range(len(links.place)):
-        way, turn = displacement(link, links, states)
-        farthest = max(farthest, norm(way) + links.reach[link] * norm(turn))
+        translation, turn = displacement(link, links, states)
+        farthest = max(farthest, norm(translation) + links.reach[link] * norm(turn))
     for k in range(len(motions)):
-        if farthest <= leap and abs(told[0, k] - motions[k].begin) > ROUNDING:
+        if farthest <= leap and abs(values[k] - motions[k].begin) > ROUNDING:
             motions[k].approach_end = arrive
-        last = max(last, arrival(motions[k]))
-    return farthest > leap, told_before, last
+        latest = max(latest, arrival(motions[k]))
+    return farthest > leap, told_before, latest
 
 
 @entry(ADDRESS, ROW, INTEGER, INTEGER, ROWS)
@@ -179,8 +180,8 @@ def change_twists(address: int, frame: np.ndarray, time: int, end: int,
     place_links(links, frame, end)
     for link in range(len(links.place)):
         own, least, most = links.twists[link], 0.0, 0.0
-        way, turn = displacement(link, links, states)
-        twist = divide(way, seconds) + divide(turn, seconds)
+        translation, turn = displacement(link, links, states)
+        twist = divide(translation, seconds) + divide(turn, seconds)
         for k in range(6):
             least = max(least, abs(twist[k]))
         for k in range(6):

@@ -142,9 +142,10 @@ class RigidEngine:
         clusters.add_work(self.doll_totals.energy - before)
 
     def set_twists(self, dolls: np.ndarray, twists: np.ndarray) -> None:
-        self._wake(self._in_clusters_of(dolls))
+        if np.count_nonzero(self.sleeping):
+            self._wake(self._in_clusters_of(dolls))
         self._clusters.set_twists(dolls, twists)
-        self._update_state()
+        self._state = State.of(self._clusters.bone_states.copy())
         self._twisted += dolls.tolist()
 
     def _in_clusters_of(self, dolls: Sequence[int]) -> np.ndarray:
