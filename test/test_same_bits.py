@@ -90,7 +90,8 @@ def old(tmp_path_factory):
     return fall(tmp_path_factory.mktemp('old'), OLD)
 
 
-ROUNDED_ONCE = {'sqrt', 'floor', 'ceil', 'copysign', 'isfinite', 'inf', 'pi', 'factorial', 'ldexp'}
+ROUNDED_ONCE = {'sqrt', 'floor', 'ceil', 'copysign', 'isfinite', 'isnan', 'inf', 'pi', 'factorial',
+                'ldexp'}
 """Of the module math: what is exact, or rounded as IEEE 754 says."""
 
 
