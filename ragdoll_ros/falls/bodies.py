@@ -20,7 +20,7 @@ def read_bodies(data: dict, folder: Path) -> tuple[tuple[StaticBody, ...], list[
     """
     found = [error for error in schema_errors('scene', {'dolls': [], **_only_bodies(data)})
              if has_error_under([error], 'bodies')]
-    static, loose, _ = build_bodies(data, folder, found)
+    static, loose, *_ = build_bodies(data, folder, found)
     bodies = tuple(static)
     found += [errors.WrongForm('bodies', body.name, 'bodies that never move, without mass and '
                                'follow') for body in loose]
