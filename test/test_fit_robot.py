@@ -229,6 +229,17 @@ def test_what_touches_at_the_start_does_not_collide(tmp_path):
     assert doll.no_collision == (('b', 'c'),), 'cubes of 0.1 m, 0.5 mm from each other; d is far'
 
 
+def test_what_fixed_joints_connect_is_one_for_collisions(tmp_path):
+    """As in MuJoCo, which merges what is welded: what a hinge connects are two parts of a and b, c
+    and d, of which none collides with another; e beyond does.
+    """
+    parts = [link(name) for name in 'abcde'] + [joint(*pair, kind=kind) for pair, kind in (
+        ('ba', 'fixed'), ('cb', 'revolute'), ('dc', 'fixed'), ('ed', 'revolute'))]
+    doll, _ = read(tmp_path, *parts)
+    pairs = {''.join(sorted(pair)) for pair in doll.excluded_pairs}
+    assert pairs == {'ab', 'cd', 'ac', 'ad', 'bc', 'bd', 'ce', 'de'}
+
+
 def test_the_world_needs_no_link(tmp_path):
     held = joint('a', 'world', 'fixed')
     assert read(tmp_path, link('a'), held) == read(

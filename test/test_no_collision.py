@@ -32,20 +32,6 @@ def test_the_two_pass_through_each_other_only_where_it_says_so(engine, through):
     assert (min(lefts) < -0.1) == through
 
 
-def test_bones_that_fixed_joints_connect_are_one_for_collisions():
-    """As in MuJoCo, which merges what is welded: what a hinge connects are two parts of a and b, c
-    and d, of which none collides with another; e beyond does.
-    """
-    bones = tuple(Bone(name, Sphere(0.1), 1.0, (0, 0, 0.3 * k)) for k, name in enumerate('abcde'))
-    joints = [Joint(*pair, kind, (0, 0, 0.3 * k + 0.15), ((1, 0, 0),) * (kind == 'hinge'),
-                    (None,) * (kind == 'hinge'))
-              for k, (pair, kind) in enumerate(zip(('ab', 'bc', 'cd', 'de'), (
-                  'fixed', 'hinge', 'fixed', 'hinge'), strict=True))]
-    doll = Ragdoll('chain', bones, tuple(joints))
-    pairs = {''.join(sorted(pair)) for pair in doll.excluded_pairs}
-    assert pairs == {'ab', 'cd', 'ac', 'ad', 'bc', 'bd', 'ce', 'de'}
-
-
 def test_a_file_keeps_it(tmp_path):
     doll = two_rods(('left', 'right'))
     save_doll(doll, tmp_path / 'rods.yaml')

@@ -6,15 +6,13 @@ import json
 import pytest
 
 pytest.importorskip('viser')
-import rclpy
 from browser import chromium, opened
 from page_client import served
-from peer import Peer, kill, listening, start
-from std_msgs.msg import Float64, String
+from peer import kill, listening, start
+from std_msgs.msg import String
 from test_viewer_motors import fells_the_doll, slider, standing
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.viewer.sources.node.motors import StrengthPublisher
 from ragdoll_ros.viewer.sources.node.source import NodeSource
 
 
@@ -35,20 +33,3 @@ def test_over_its_topic_the_slider_fells_the_doll_of_a_node(ros, tmp_path):
                     for event in (json.loads(message.data) for _, message in list(events))))
         finally:
             kill(node)
-
-
-def test_a_strength_waits_for_the_subscription(ros):
-    node, listener = rclpy.create_node('page'), Peer('listener')
-    try:
-        publisher = StrengthPublisher(node, 'ragdoll')
-        for strength in (0.7, 0.2):
-            publisher.send(strength)
-        heard = listener.collect(Float64, 'ragdoll/motor_strength')
-        listener.wait(lambda: publisher.retry() or heard)
-        publisher.retry()
-        publisher.send(0.4)
-        listener.wait(lambda: len(heard) > 1)
-        assert [message.data for _, message in heard] == [0.2, 0.4]
-    finally:
-        node.destroy_node()
-        listener.destroy_node()

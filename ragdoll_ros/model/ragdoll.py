@@ -6,7 +6,6 @@ the doll's frame in the bind pose, where every joint angle is zero. Quaternions 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 import os
 from collections import defaultdict
@@ -332,25 +331,11 @@ class Ragdoll:
         moments = [bone.mass * np.array(bone.position) for bone in self.bones]
         return np.asarray(sum(moments)) / self.mass
 
-    @cached_property
+    @property
     def excluded_pairs(self) -> frozenset[frozenset[str]]:
-        """Pairs of names of bones that do not collide: those of one rigid part, which fixed joints
-        connect, those of two parts that a joint connects, and ``no_collision``.
-        """
-        part = {self.root.name: [self.root.name]}
-        beside = []
-        for joint in self.joints_from_root():
-            above = part[joint.parent]
-            if joint.kind == 'fixed':
-                above.append(joint.child)
-                part[joint.child] = above
-            else:
-                part[joint.child] = [joint.child]
-                beside.append((above, part[joint.child]))
-        parts = {id(bones): bones for bones in part.values()}.values()
-        return frozenset(map(frozenset, itertools.chain(
-            self.no_collision, *(itertools.combinations(bones, 2) for bones in parts),
-            *(itertools.product(above, below) for above, below in beside))))
+        """Pairs of names of bones that do not collide: jointed ones and ``no_collision``."""
+        jointed = ((joint.parent, joint.child) for joint in self.joints)
+        return frozenset(frozenset(pair) for pair in (*jointed, *self.no_collision))
 
     def __repr__(self) -> str:
         return (f'Ragdoll {self.name!r}: {len(self.bones)} bones, {len(self.joints)} joints, '

@@ -45,8 +45,9 @@ def overlapping_pairs(bones: tuple[Bone, ...],
 
 def colliding_overlaps(doll: Ragdoll, least: float = MIN_OVERLAP) -> tuple[tuple[str, str], ...]:
     """Names of the pairs of bodies that overlap by more than ``least`` m and that may collide."""
+    excluded = doll.excluded_pairs
     return tuple(pair for pair in overlapping_pairs(doll.bones, least)
-                 if frozenset(pair) not in doll.excluded_pairs)
+                 if frozenset(pair) not in excluded)
 
 
 def covered(bones: tuple[Bone, ...], points: np.ndarray, tolerance: float) -> np.ndarray:

@@ -7,6 +7,7 @@ weighs next to nothing is fixed to its parent, with both. Every link's frame bec
 doll, so that it can be published. Angles have the names of the joints in the file, where they count
 from the same zero.
 """
+import itertools
 import math
 from collections import Counter
 from collections.abc import Collection, Sequence
@@ -104,7 +105,29 @@ def doll_from_tree(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll,
     frames = _frames({name: pose for name, pose in poses.items() if tree.links[name].is_in_file},
                      carriers, names, bones)
     doll = Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames)
-    return replace(doll, no_collision=colliding_overlaps(doll, -TOUCHING)), notes
+    doll = replace(doll, no_collision=_pairs_of_parts(doll))
+    touching = colliding_overlaps(doll, -TOUCHING)
+    return replace(doll, no_collision=(*doll.no_collision, *touching)), notes
+
+
+def _pairs_of_parts(doll: Ragdoll) -> tuple[tuple[str, str], ...]:
+    """Pairs of bones of one part, which fixed joints connect, and of two parts that a joint
+    connects, without those that a joint itself connects. MuJoCo does not let them collide either.
+    """
+    part, beside = {doll.root.name: [doll.root.name]}, []
+    for joint in doll.joints_from_root():
+        above = part[joint.parent]
+        if joint.kind == 'fixed':
+            above.append(joint.child)
+            part[joint.child] = above
+        else:
+            part[joint.child] = [joint.child]
+            beside.append((above, part[joint.child]))
+    parts, jointed = {id(bones): bones for bones in part.values()}.values(), doll.excluded_pairs
+    return tuple(pair for pair in itertools.chain(
+        *(itertools.combinations(bones, 2) for bones in parts),
+        *(itertools.product(above, below) for above, below in beside))
+        if frozenset(pair) not in jointed)
 
 
 def _light_links(tree: UrdfTree, shapes: dict[str, list[PlacedShape]]) -> dict[str, float]:

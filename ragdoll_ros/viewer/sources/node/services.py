@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import queue
+import time
 from collections.abc import Callable, Sequence
 
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
@@ -11,6 +12,9 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
 from ....model import errors
+
+PATIENCE = 10.0
+"""s that a trigger waits for its service: to discover one takes up to 3 s, on a busy machine 10."""
 
 RESPONSE_TIMEOUT = 60.0
 """s: the node builds a scene before it responds, beside its ticks: .1 s for a doll on an idle
@@ -31,10 +35,20 @@ class NodeServices:
         self._triggers = {service: node.create_client(Trigger, f'{name}/{service}')
                           for service in ('reset', 'step', 'go_limp')}
         self._pause = node.create_client(SetBool, f'{name}/pause')
+        self._waiting: dict[str, float] = {}
+        """When triggers were asked for whose services are not known yet, s of the steady clock."""
 
     def trigger(self, service: str) -> None:
-        """Call ``reset``, ``step`` or ``go_limp``."""
-        self._send(self._triggers[service], Trigger.Request())
+        """Call ``reset``, ``step`` or ``go_limp``; one that is not known yet as soon as it is."""
+        if not self._send(self._triggers[service], Trigger.Request()):
+            self._waiting[service] = time.monotonic()
+
+    def retry(self) -> None:
+        """Call what waits; nothing that has waited for longer than PATIENCE."""
+        for service, asked in list(self._waiting.items()):
+            if time.monotonic() - asked > PATIENCE or self._send(
+                    self._triggers[service], Trigger.Request()):
+                self._waiting.pop(service, None)
 
     def pause(self, paused: bool) -> bool:
         """Pause or resume; False if there is no node."""

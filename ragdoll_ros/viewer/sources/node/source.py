@@ -267,6 +267,7 @@ class NodeSource(Source):
             self._hands.clear()
         self._hands.keep_alive()
         self._strength.retry()
+        self._services.retry()
         self._scene.request()
 
     def _use_scene(self) -> None:
