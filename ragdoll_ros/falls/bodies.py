@@ -20,10 +20,10 @@ def read_bodies(data: dict, folder: Path) -> tuple[tuple[StaticBody, ...], list[
     """
     found = [error for error in schema_errors('scene', {'dolls': [], **_only_bodies(data)})
              if has_error_under([error], 'bodies')]
-    static, loose, *_ = build_bodies(data, folder, found)
-    bodies = tuple(static)
+    built = build_bodies(data, folder, found)
+    bodies = tuple(built.static)
     found += [errors.WrongForm('bodies', body.name, 'bodies that never move, without mass and '
-                               'follow') for body in loose]
+                               'follow') for body in built.loose]
     floor = data.get('floor', [])
     for index, name in enumerate(floor if isinstance(floor, list) else ()):
         if not found and not floor_names(bodies, [name]):
