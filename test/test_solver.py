@@ -11,8 +11,12 @@ pytest.importorskip('numba')
 from kept_code import kept
 
 from ragdoll_ros.physics.kernels.impulses.active_set import solve_active_set
+from ragdoll_ros.physics.kernels.impulses.newton import newton
 from ragdoll_ros.physics.kernels.impulses.one_contact import solve_one_contact
-from ragdoll_ros.physics.kernels.workspace import MEMBER
+from ragdoll_ros.physics.kernels.impulses.solver import ROUNDS, solve_cones
+from ragdoll_ros.physics.kernels.maths.gaussian_elimination import gaussian_elimination
+from ragdoll_ros.physics.kernels.system import NO_SLIP
+from ragdoll_ros.physics.kernels.workspace import MEMBER, UNKNOWN
 
 Island = collections.namedtuple('Island', 'members W G velocity active places is_normal')
 """What of an island the active set method reads and writes."""
@@ -94,3 +98,123 @@ def test_many_that_stick_keep_the_laws(seed):
         assert np.abs(u[rows] * (p[rows] > 0)).max() <= small
         assert np.abs(u[along[sticks]]).max(initial=0.0) <= small
         assert not p[along[~sticks]].any()
+
+
+@kept
+def _eliminate(matrix, x):
+    return gaussian_elimination(matrix, len(x), x)
+
+
+@pytest.mark.parametrize('n', [1, 2, 3, 5, 6, 8, 12, 40])
+def test_elimination_solves_what_needs_pivots(n):
+    """Zero pivots in the order given; rounding of n sums, times the condition."""
+    draw = np.random.default_rng(n)
+    for _ in range(20):
+        matrix = draw.normal(size=(n, n))
+        if n > 1:
+            np.fill_diagonal(matrix, 0.0)
+            matrix[0, 0] = 0.0
+        b = draw.normal(size=n)
+        x = b.copy()
+        assert _eliminate(matrix.ravel().copy(), x)
+        error = np.linalg.norm(matrix @ x - b) / np.linalg.norm(b)
+        assert error < 1e-15 * n * np.linalg.cond(matrix)
+
+
+@pytest.mark.parametrize('n', [1, 2, 3, 6])
+@pytest.mark.parametrize('row', [0, -1])
+def test_elimination_says_that_a_matrix_is_singular(n, row):
+    matrix = np.eye(n)
+    matrix[row] = 0.0
+    assert not _eliminate(matrix.ravel(), np.ones(n))
+
+
+Cones = collections.namedtuple('Cones', (
+    *Island._fields, 'residual', 'direction', 'best', 'step_start', 'newton_steps', 'unknowns',
+    'combined'))
+"""What Newton's method reads and writes besides."""
+
+
+@kept
+def _cones(island, b, p, tolerance, rounds):
+    return solve_cones(island, len(island.members), len(b), b, p, tolerance, rounds)[0]
+
+
+@kept
+def _newton(island, b, p, tolerance, proximal):
+    return newton(island, len(island.members), len(b), b, p, tolerance, proximal)
+
+
+def mixed(draw, count):
+    """Members of so many limits, contacts with friction, without, with all of it, and rolling."""
+    members = np.zeros(count, MEMBER)
+    members['kind'] = draw.choice([1, 3, 3, 3, 5], count)
+    members['row'] = np.cumsum(members['kind']) - members['kind']
+    members['friction'] = draw.choice([0.0, 0.3, 0.7, 1.0, NO_SLIP], count)
+    members['rolling_friction'] = draw.choice([0.0, 0.02], count)
+    return members
+
+
+def cones(members, ease):
+    n = len(ease)
+    return Cones(members, ease.ravel(), np.zeros(n * n), np.zeros(n), np.zeros(2 * n + 2),
+                 np.zeros(n + 1, np.int64), np.zeros(n, np.int64), np.zeros(n), np.zeros(n),
+                 np.zeros(n), np.zeros(n), np.zeros(1, np.int64), np.zeros(n, UNKNOWN),
+                 np.zeros(n))
+
+
+def largest_breach(members, ease, b, p):
+    """By how much, m/s, impulses break the laws of any member: each of its discs is like the
+    friction of a contact with that normal impulse.
+    """
+    worst, u = 0.0, ease @ p + b
+    for member in members:
+        a = member['row']
+        worst = max(worst, -u[a], -p[a] * ease[a, a], min(abs(u[a]), abs(p[a]) * ease[a, a]))
+        for k in range(1, member['kind'], 2):
+            i = a + k
+            law = member['friction'] if k == 1 else member['rolling_friction']
+            if k == 1 and law >= NO_SLIP:
+                worst = max(worst, np.abs(u[i:i + 2]).max())
+                continue
+            size, speed = np.linalg.norm(p[i:i + 2]), np.linalg.norm(u[i:i + 2])
+            own, most = max(ease[i, i], ease[i + 1, i + 1]), law * p[a]
+            worst = max(worst, (size - most) * own)
+            if size < most - 1e-9:
+                worst = max(worst, speed)
+            elif speed > 0:
+                worst = max(worst, own * np.linalg.norm(p[i:i + 2] + most * u[i:i + 2] / speed)
+                            if speed > 1e-7 else 0.0)
+    return worst
+
+
+@pytest.mark.parametrize('count', [1, 2, 3, 5, 6, 8, 12])
+def test_what_slips_sticks_rolls_and_opens_together_keeps_the_laws(count):
+    """Solved, whatever the kinds: 40 islands of bodies with more freedom than rows, so that there
+    is a solution. Its direction is known as well as a slip of 1e-7 m/s allows.
+    """
+    draw = np.random.default_rng(count)
+    for _ in range(40):
+        members = mixed(draw, count)
+        n = int(members['kind'].sum())
+        rows = draw.normal(size=(n, n + 6))
+        ease, b, p = rows @ rows.T / n, draw.normal(size=n), np.zeros(n)
+        assert _cones(cones(members, ease), b, p, 1e-9, ROUNDS) <= 1e-9
+        assert largest_breach(members, ease, b, p) < 1e-6
+
+
+def test_newton_ends_in_quadratic_steps():
+    """From 1e-3 beside a solution two steps reach rounding: 1e-3, 1e-6, 1e-12 of the impulses."""
+    draw, taken = np.random.default_rng(7), []
+    for _ in range(40):
+        members = mixed(draw, 8)
+        n = int(members['kind'].sum())
+        rows = draw.normal(size=(n, n + 6))
+        ease, b, p = rows @ rows.T / n, draw.normal(size=n), np.zeros(n)
+        island = cones(members, ease)
+        _cones(island, b, p, 1e-11, ROUNDS)
+        p *= 1 + 1e-3 * draw.normal(size=n)
+        island.newton_steps[0] = 0
+        assert _newton(island, b, p, 1e-9, 0.0) <= 1e-9
+        taken.append(int(island.newton_steps[0]))
+    assert np.median(taken) <= 2 and max(taken) <= 6

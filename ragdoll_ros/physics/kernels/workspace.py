@@ -40,13 +40,14 @@ it was last halved, and the chords since."""
 
 STEP_SCALARS = np.dtype([
     ('start_contact_count', np.int64), ('start_point_count', np.int64), ('tried_count', np.int64),
-    ('tracks_points', np.int64), ('seeks_impacts', np.int64), ('correction_energy', float),
-    ('start_load_potential', float), ('residual', float), ('solve_error', float)], align=True)
+    ('tried_dt', float), ('tracks_points', np.int64), ('seeks_impacts', np.int64),
+    ('correction_energy', float), ('start_load_potential', float), ('residual', float),
+    ('solve_error', float)], align=True)
 """Of a contact step: contacts at its start, points that have gaps of their own then, and contacts
-in its last trial if that was as long; whether points have gaps now; whether it ends at impacts;
-potential energy that position correction adds, J; load_potential() at its start, J; the largest
-residual velocity of its large islands, m/s, and the share of the velocities that is allowed, see
-physics/accuracy.py."""
+in its last trial, and that one's length, s; whether points have gaps now; whether it ends at
+impacts; potential energy that position correction adds, J; load_potential() at its start, J; the
+largest residual velocity of its large islands, m/s, and the share of the velocities that is
+allowed, see physics/accuracy.py."""
 
 GAP_COUNTS = np.dtype([('fixed', np.int64), ('live', np.int64)], align=True)
 """Gaps of ground points, limits and pairs; these and those of contacts.points."""
@@ -74,12 +75,20 @@ the ``first_point`` (p,) among them of each pair, see point_gaps.py. ``manifold`
 joint of a body is outside its limits. ``angles``, ``u``, ``v`` (c,): the corners of a patch in
 order, see patch.py."""
 
+UNKNOWN = np.dtype([
+    ('row', np.int64), ('width', np.int64), ('share', float), ('slack', float),
+    ('direction', float, 5)], align=True)
+"""An unknown of Newton's method on a small island: an impulse along so many rows (``width``) from
+``row`` on, along their ``direction``. That of friction across a slip, with two rows, has the
+equation ``share`` * (velocity) + ``slack`` * (impulse) = its residual; that of others is the
+velocity of their row."""
+
 Island = collections.namedtuple(
     'Island', 'members label Y YT support place W G blocks rhs impulses free_velocity '
     'start_velocity curvature correction soft velocity residual direction best step_start active '
     'places is_normal normal_rhs normal_impulses normal_row z z_direction anderson '
     'bodies body_number elimination dof_place A B BY coupled phi local lu occurrence_start '
-    'occurrences newton_steps newton_dofs')
+    'occurrences newton_steps newton_dofs unknowns combined')
 """An island of m contacts (``members``) and their rows, and scratch to solve it.
 
 ``label`` (d,): island of each doll. Rows ``Y`` = J L^-1 have entries for the degrees of freedom
@@ -93,7 +102,7 @@ others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p; of sparse_
 ``elimination``, the ``dof_place`` (nv,) that follows, ``lu`` and ``occurrences``; ``anderson``: of
 sweeps. ``newton_steps`` (1,): counted by both of Newton's methods;
 ``newton_dofs`` (1,): those of sparse_newton.py, 0 if sweeps cost less, -1 as long as that is not
-known."""
+known; ``unknowns`` of newton.py, and a row of its matrix, ``combined``."""
 
 Step = collections.namedtuple(
     'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
@@ -183,7 +192,8 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         phi=np.zeros((contacts, 5)), local=np.zeros(5), lu=make_sparse_lu(nv, contacts, wide),
         occurrence_start=np.zeros(nv + 1, np.int64),
         occurrences=np.zeros(contacts * wide, OCCURRENCE), newton_steps=np.zeros(1, np.int64),
-        newton_dofs=np.zeros(1, np.int64))
+        newton_dofs=np.zeros(1, np.int64), unknowns=np.zeros(max(few, 8), UNKNOWN),
+        combined=each_row())
 
 
 WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

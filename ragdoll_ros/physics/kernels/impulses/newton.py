@@ -5,6 +5,10 @@ bear together are nearly undetermined, and a full step along them leaves every f
 each step is one of the proximal point method (Rockafellar, SIAM Journal on Control and Optimization
 14, 1976): a share ``proximal`` of the diagonal of W resists the change of an impulse, which does
 not move the solution.
+
+A step is solved for what is unknown in it alone: nothing of a contact that is open, three rows of
+one that sticks, two of one that slips, whose friction along the slip follows from the normal
+impulse.
 """
 from __future__ import annotations
 
@@ -13,9 +17,10 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..maths.gaussian_elimination import gaussian_elimination
 from ..system import NO_SLIP
 from ..workspace import Island
-from .gauss_seidel import velocities
+from .gauss_seidel import add_velocity_change, velocities
 from .one_contact import project_to_disc
 
 MAX_STEPS = 40
@@ -55,129 +60,116 @@ def alart_curnier(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray) 
 
 
 @compiled
-def linearize(island: Island, m: int, n: int, p: np.ndarray, proximal: float) -> None:
-    """Write the Jacobian of alart_curnier() at p, with the share ``proximal`` of W's diagonal added
-    to W, to island.G, flat (n * n), and the right-hand side of a step to island.direction.
+def list_unknowns(island: Island, m: int, n: int, p: np.ndarray) -> int:
+    """Write what a Newton step from p is to find to island.unknowns, and the part of the step that
+    is known before to island.direction. Returns the number of unknowns. After alart_curnier().
+
+    Open contacts lose their impulses. Of friction that slips, the part along the slip follows from
+    the normal impulse; the part across it is unknown.
     """
-    W, G, u, direction = island.W, island.G, island.velocity, island.direction
-    for i in range(n):
-        direction[i] = -island.residual[i]
+    W, u, direction, unknowns, count = island.W, island.velocity, island.direction, (
+        island.unknowns), 0
     for c in range(m):
         member = island.members[c]
         a = member.row
-        own = W[a * n + a]
-        push = p[a] - u[a] / own
-        active = push > 0
-        write_velocity_row(W, G, n, a, active, proximal)
-        if not active:
+        push, normal = p[a] - u[a] / W[a * n + a], count
+        for i in range(a, a + member.kind):
+            direction[i] = 0.0
+        if push > 0:
+            count = add_unknown(unknowns, count, a)
+        else:
             direction[a] = -p[a]
         for k in range(1, member.kind, 2):
             i = a + k
-            own_t = max(W[i * n + i], W[(i + 1) * n + i + 1])
-            law = max(0.0, member.friction if k == 1 else member.rolling_friction)
-            y, z = p[i] - u[i] / own_t, p[i + 1] - u[i + 1] / own_t
-            size, most = math.sqrt(y * y + z * z), law * max(0.0, push)
+            law = member.friction if k == 1 else member.rolling_friction
             sticks = k == 1 and law >= NO_SLIP
-            if sticks or not active or size <= most:
-                for e in range(i, i + 2):
-                    write_velocity_row(W, G, n, e, active or sticks, proximal)
-                    if not active and not sticks:
-                        direction[e] = -p[e]
+            if not sticks and (push <= 0 or law <= 0):
+                direction[i], direction[i + 1] = -p[i], -p[i + 1]
                 continue
-            y1, z1, share = y / size, z / size, most / size
-            for e in range(2):
-                at, d = (i + e) * n, y1 if e == 0 else z1
-                ky = share * ((1.0 if e == 0 else 0.0) - d * y1)
-                kz = share * ((1.0 if e == 1 else 0.0) - d * z1)
-                normal = own_t * law * d / own
-                for j in range(n):
-                    G[at + j] = normal * W[a * n + j] + (
-                        ky * W[i * n + j] + kz * W[(i + 1) * n + j])
-                G[at + a] += proximal * normal * own - own_t * law * d
-                G[at + i + e] += own_t
-                G[at + i] += (proximal * W[i * n + i] - own_t) * ky
-                G[at + i + 1] += (proximal * W[(i + 1) * n + i + 1] - own_t) * kz
-
-
-@compiled
-def write_velocity_row(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool,
-                       proximal: float) -> None:
-    """Write row i of the Jacobian G: W's, its diagonal times 1 + ``proximal``, so that the step
-    zeroes the row's velocity; the identity's if not ``active``, so that it zeroes its impulse.
-    """
-    at = i * n
-    for j in range(n):
-        G[at + j] = W[at + j] if active else 0.0
-    G[at + i] = (1 + proximal) * W[at + i] if active else 1.0
-
-
-@compiled
-def gaussian_elimination(G: np.ndarray, n: int, x: np.ndarray) -> bool:
-    """Solve G x = b in place with partial pivoting. Returns whether G is regular."""
-    for k in range(n):
-        best, most = k, abs(G[k * n + k])
-        for i in range(k + 1, n):
-            if abs(G[i * n + k]) > most:
-                best, most = i, abs(G[i * n + k])
-        if not most > 1e-300:
-            return False
-        if best != k:
-            for j in range(k, n):
-                G[k * n + j], G[best * n + j] = G[best * n + j], G[k * n + j]
-            x[k], x[best] = x[best], x[k]
-        inverse, pivot = 1 / G[k * n + k], G[k * n + k + 1:k * n + n]
-        for i in range(k + 1, n):
-            f, row = G[i * n + k] * inverse, G[i * n + k + 1:i * n + n]
-            if f != 0.0:
-                for j in range(n - k - 1):
-                    row[j] -= f * pivot[j]
-                x[i] -= f * x[k]
-    for i in range(n - 1, -1, -1):
-        s = x[i]
-        for j in range(i + 1, n):
-            s -= G[i * n + j] * x[j]
-        x[i] = s / G[i * n + i]
-    return True
-
-
-@compiled
-def solve_reduced(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray,
-                  reduced: np.ndarray) -> bool:
-    """Solve G x = b, flat (n * n), in place; returns whether G is regular. Rows of open contacts
-    have only their diagonal: they are eliminated first. places, reduced (n,): scratch.
-    """
-    m = 0
-    for i in range(n):
-        alone = True
-        for j in range(n):
-            if j != i and G[i * n + j] != 0.0:
-                alone = False
-                break
-        if alone:
-            x[i] /= G[i * n + i]
-        else:
-            places[m] = i
-            m += 1
-    k = 0
-    for a in range(m):
-        i = places[a]
-        c = 0
-        for j in range(n):
-            if c < m and places[c] == j:
-                c += 1
+            own = max(W[i * n + i], W[(i + 1) * n + i + 1])
+            y, z = p[i] - u[i] / own, p[i + 1] - u[i + 1] / own
+            size = math.sqrt(y * y + z * z)
+            if sticks or size <= law * push:
+                count = add_unknown(unknowns, add_unknown(unknowns, count, i), i + 1)
             else:
-                x[i] -= G[i * n + j] * x[j]
-    for a in range(m):
-        i = places[a]
-        for c in range(m):
-            G[k] = G[i * n + places[c]]
-            k += 1
-        reduced[a] = x[i]
-    if not gaussian_elimination(G, m, reduced):
-        return False
-    for a in range(m):
-        x[places[a]] = reduced[a]
-    return True
+                add_slip(island, unknowns[normal], k, (y / size, z / size), law,
+                         law * u[a] / W[a * n + a], own)
+                count = add_unknown(unknowns, count, i)
+                across = unknowns[count - 1]
+                across.width, across.direction[0], across.direction[1] = 2, -z / size, y / size
+                across.share = law * push / size
+                across.slack = own * (1 - across.share)
+    return count
+
+
+@compiled
+def add_slip(island: Island, normal: np.record, k: int, d: tuple[float, float], law: float,
+             offset: float, own: float) -> None:
+    """Add friction along a slip of direction d, rows normal.row + k and the next, to the unknown
+    ``normal``, times the coefficient ``law``, and the part that does not depend on it to
+    island.direction. ``offset``: of that part, N s; ``own``: diagonal entry of W.
+    """
+    i, residual = normal.row + k, island.residual
+    normal.width, normal.direction[k], normal.direction[k + 1] = k + 2, law * d[0], law * d[1]
+    known = offset - (residual[i] * d[0] + residual[i + 1] * d[1]) / own
+    island.direction[i], island.direction[i + 1] = known * d[0], known * d[1]
+
+
+@compiled
+def add_unknown(unknowns: np.ndarray, count: int, row: int) -> int:
+    """Write unknown number ``count``, the impulse of a row by itself. Returns the next number."""
+    new = unknowns[count]
+    new.row, new.width, new.share, new.slack = row, 1, 1.0, 0.0
+    new.direction[0] = 1.0
+    for e in range(1, 5):
+        new.direction[e] = 0.0
+    return count + 1
+
+
+@compiled
+def linearize(island: Island, count: int, n: int, proximal: float) -> None:
+    """Write the matrix of ``count`` unknowns of a Newton step to island.G, flat, with the share
+    ``proximal`` of W's diagonal added to W, and the right-hand side to island.active.
+    """
+    W, G, rhs, known, row = island.W, island.G, island.active, island.step_start, island.combined
+    residual = island.residual
+    for i in range(n):
+        known[i] = 0.0
+    for j in range(n):
+        add_velocity_change(W, n, j, island.direction[j], known)
+    for k in range(count):
+        own = island.unknowns[k]
+        i = own.row
+        first = W[i * n:i * n + n]
+        if own.width == 2:
+            x, y = own.direction[0], own.direction[1]
+            rhs[k] = -x * residual[i] - y * residual[i + 1]
+            x, y = own.share * x, own.share * y
+            second = W[(i + 1) * n:(i + 1) * n + n]
+            for j in range(n):
+                row[j] = x * first[j] + y * second[j]
+            rhs[k] -= x * known[i] + y * known[i + 1]
+        else:
+            for j in range(n):
+                row[j] = first[j]
+            rhs[k] = -residual[i] - known[i]
+        for c in range(count):
+            other = island.unknowns[c]
+            j = other.row
+            total = other.direction[0] * row[j]
+            for e in range(1, other.width):
+                total += other.direction[e] * row[j + e]
+            G[k * count + c] = total
+        G[k * count + k] += own.slack + proximal * own.share * first[i]
+
+
+@compiled
+def add_unknowns(island: Island, count: int) -> None:
+    """Add the ``count`` unknowns found, island.active, to island.direction, the step."""
+    for k in range(count):
+        own = island.unknowns[k]
+        for e in range(own.width):
+            island.direction[own.row + e] += own.direction[e] * island.active[k]
 
 
 @compiled
@@ -196,9 +188,11 @@ def newton(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, toleran
         if best <= tolerance or late > PATIENCE or turn == MAX_STEPS:
             break
         island.newton_steps[0] += 1
-        linearize(island, m, n, p, proximal)
-        if not solve_reduced(island.G, n, direction, island.places, island.active):
+        count = list_unknowns(island, m, n, p)
+        linearize(island, count, n, proximal)
+        if not gaussian_elimination(island.G, count, island.active):
             break
+        add_unknowns(island, count)
         total = 0.0
         for i in range(n):
             total += direction[i]
