@@ -84,14 +84,17 @@ def apply_inverse_factor(dof_parent: np.ndarray, L: np.ndarray, island: Island, 
     Y, place, support = island.Y, island.place, island.support[index]
     for n in range(c.dof_count):
         place[support[n]] = n
-    for e in range(c.first_row, c.first_row + c.kind):
-        for n in range(c.dof_count):
-            i = support[n]
-            Y[e, n] /= L[i, i]
-            f, j = Y[e, n], dof_parent[i]
-            while j >= 0:
-                Y[e, place[j]] -= L[i, j] * f
-                j = dof_parent[j]
+    first, end = c.first_row, c.first_row + c.kind
+    for n in range(c.dof_count):
+        i = support[n]
+        own, j = L[i, i], dof_parent[i]
+        for e in range(first, end):
+            Y[e, n] /= own
+        while j >= 0:
+            at, factor = place[j], L[i, j]
+            for e in range(first, end):
+                Y[e, at] -= factor * Y[e, n]
+            j = dof_parent[j]
 
 
 @compiled
