@@ -1,11 +1,15 @@
 """Counters of refused and clamped input."""
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections import Counter
+from collections.abc import Iterator
 
 from rclpy.impl.rcutils_logger import RcutilsLogger
+
+from ...model.errors import ModelError
 
 WARNING_PERIOD = 1.0
 """s: throttle of the warnings."""
@@ -31,6 +35,14 @@ class InputCounts:
         """Count an input that was ignored."""
         self.refused[source] += 1
         self._warn(f'{source} refused: {reason}')
+
+    @contextlib.contextmanager
+    def refusing(self, source: str) -> Iterator[None]:
+        """Refuse the input that raises a ModelError within, and count it."""
+        try:
+            yield
+        except ModelError as error:
+            self.refuse(source, error)
 
     def clamp(self, source: str, reason: object) -> None:
         """Count an input that was limited."""

@@ -134,10 +134,8 @@ class InteractiveMarkerServer:
 
     def on_feedback(self, message: InteractiveMarkerFeedback) -> None:
         """Move a hand as the feedback asks; see the list above."""
-        try:
+        with self._counts.refusing(FEEDBACK):
             self._apply(message)
-        except errors.ModelError as error:
-            self._counts.refuse(FEEDBACK, error)
 
     def _apply(self, message: InteractiveMarkerFeedback) -> None:
         self._check(message)

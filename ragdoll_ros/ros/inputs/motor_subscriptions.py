@@ -1,13 +1,10 @@
 """Subscriptions that drive motors: they set targets and strengths."""
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-from ...model import errors
 from ...physics.simulation import Simulation
 from .input_counts import InputCounts
 from .joint_values import joint_efforts, joint_values
@@ -40,18 +37,15 @@ class MotorSubscriptions:
 
     def on_pose_target(self, message: JointState) -> None:
         """Set targets; a message that is wrong is refused and counted, all of it."""
-        self._take(TARGET, lambda: self.simulation.set_pose_target(*joint_values(message)))
+        with self._counts.refusing(TARGET):
+            self.simulation.set_pose_target(*joint_values(message))
 
     def on_strength(self, message: Float64) -> None:
         """Set the strength of all motors; what is no strength is refused and counted."""
-        self._take(STRENGTH, lambda: self.simulation.set_strength(message.data))
+        with self._counts.refusing(STRENGTH):
+            self.simulation.set_strength(message.data)
 
     def on_joint_strengths(self, message: JointState) -> None:
         """Set strengths; a message that is wrong is refused and counted, all of it."""
-        self._take(STRENGTHS, lambda: self.simulation.set_strength(joint_efforts(message)))
-
-    def _take(self, topic: str, act: Callable[[], None]) -> None:
-        try:
-            act()
-        except errors.ModelError as error:
-            self._counts.refuse(topic, error)
+        with self._counts.refusing(STRENGTHS):
+            self.simulation.set_strength(joint_efforts(message))

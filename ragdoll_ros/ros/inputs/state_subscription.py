@@ -48,19 +48,14 @@ class StateSubscription:
 
     def on_odometry(self, message: Odometry) -> None:
         """Set pose and velocities of a doll; a message that is wrong is refused and counted."""
-        self._take(TOPIC, lambda: self._set(message))
+        with self._counts.refusing(TOPIC):
+            self._set(message)
+            self._after()
 
     def on_joint_state(self, message: JointState) -> None:
         """Set joint angles and rates; a message that is wrong is refused and counted."""
-        self._take(JOINTS, lambda: self._set_joints(message))
-
-    def _take(self, topic: str, set_state: Callable[[], None]) -> None:
-        """Set a state by a message on ``topic``, or count that it was refused."""
-        try:
-            set_state()
-        except errors.ModelError as error:
-            self._counts.refuse(topic, error)
-        else:
+        with self._counts.refusing(JOINTS):
+            self._set_joints(message)
             self._after()
 
     def _set_joints(self, message: JointState) -> None:

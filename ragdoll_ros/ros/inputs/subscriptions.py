@@ -86,7 +86,7 @@ class PushSubscriptions:
         turn does not hold it in the air. A zero twist ends the drive.
         """
         settings = self.settings
-        try:
+        with self._counts.refusing('cmd_vel'):
             linear, angular = (self._limited('cmd_vel', name, vector, MAX_SPEED, 'the limit')
                                for name, vector in (('linear', message.linear),
                                                     ('angular', message.angular)))
@@ -100,8 +100,6 @@ class PushSubscriptions:
                     duration=settings.cmd_vel_timeout), 'cmd_vel')
             else:
                 self.simulation.release('cmd_vel')
-        except errors.ModelError as error:
-            self._counts.refuse('cmd_vel', error)
 
     def on_stamped_cmd_vel(self, message: TwistStamped) -> None:
         """As on_cmd_vel; without a frame, as by many keyboards, it is in the world frame."""
@@ -117,38 +115,31 @@ class PushSubscriptions:
         """Push the pushed bone in the world frame, or the bone of frame_id in its own frame."""
         settings, frame = self.settings, message.header.frame_id
         local = frame not in (WORLD, settings.frame_id)
-        try:
+        with self._counts.refusing('~/push'):
             names = self.simulation.scene.bone_names
             if local and frame not in names:
                 raise errors.UnknownBone('header.frame_id', frame,
                                          f'one of {", ".join((WORLD, *names))}')
-        except errors.ModelError as error:
-            self._counts.refuse('~/push', error)
-            return
-        bone = frame if local else settings.pushed_bone
-        self._push('~/push', f'push {frame if local else WORLD}', bone, message.wrench, local)
+            bone = frame if local else settings.pushed_bone
+            self._push('~/push', f'push {frame if local else WORLD}', bone, message.wrench, local)
 
     def on_wrench_at(self, message: MultiDOFJointState) -> None:
         """Push bones at points of theirs, all that the message names or none."""
-        try:
+        with self._counts.refusing(WRENCH_AT):
             for channel, push in pushes_at(message, self.simulation.scene, self.settings.frame_id,
                                            self.settings.push_timeout, self._limited_at):
                 self._push_or_release(push, channel)
-        except errors.ModelError as error:
-            self._counts.refuse(WRENCH_AT, error)
 
     def _push(self, source: str, channel: str, bone: str, wrench: Wrench,
               local: bool = False) -> None:
         """Apply a wrench for push_timeout; ``local``: in the bone's own frame."""
         limit = self.settings.max_force
-        try:
+        with self._counts.refusing(source):
             force = self._limited(source, 'force', wrench.force, limit, 'max_force')
             torque = self._limited(source, 'torque', wrench.torque, limit * TORQUE_ARM,
                                    MAX_TORQUE_NAME)
             self._push_or_release(Push(bone, force, torque, local=local,
                                        duration=self.settings.push_timeout), channel)
-        except errors.ModelError as error:
-            self._counts.refuse(source, error)
 
     def _push_or_release(self, push: Push, channel: str) -> None:
         """Apply a push; one without force and torque ends the last one of its channel."""

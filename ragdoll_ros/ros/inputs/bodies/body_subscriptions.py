@@ -104,27 +104,23 @@ class BodySubscriptions:
         """Move a body on from a pose; a message that is wrong is refused and counted."""
         pose, source = message.pose.pose, f'{body_topic(name)}/odom'
         q, p = pose.orientation, pose.position
-        try:
+        with self._counts.refusing(source):
             orientation = unit_vector('pose.orientation', (q.x, q.y, q.z, q.w),
                                       'a quaternion x, y, z, w, not zero', 4)
             self._drive(source, name, (p.x, p.y, p.z, *orientation), orientation,
                         message.twist.twist, self._times.lead(from_time(message.header.stamp)))
-        except errors.ModelError as error:
-            self._counts.refuse(source, error)
 
     def on_cmd_vel(self, name: str, message: Twist) -> None:
         """Move a body on from where it is; a message that is wrong is refused and counted."""
         source = f'{body_topic(name)}/cmd_vel'
-        try:
+        with self._counts.refusing(source):
             self._drive(source, name, None, self.simulation.body_pose(name)[3:], message, 0.0)
-        except errors.ModelError as error:
-            self._counts.refuse(source, error)
 
     def on_joint_states(self, name: str, message: JointState) -> None:
         """Move joints of a robot on; a message that is wrong is refused and counted. Names that are
         not the robot's are left out, if others are: of a gripper, or a second arm.
         """
-        try:
+        with self._counts.refusing(f'{body_topic(name)}/{JOINTS}'):
             angles, rates = joint_values(message)
             known = turning_joints(self.simulation.scene, name)
             if known.keys() & set(message.name):
@@ -140,9 +136,6 @@ class BodySubscriptions:
                 self.simulation.drive_body(name, rates=rates, joint_angles=angles)
             else:
                 self._aim(name, angles, rates, known)
-        except errors.ModelError as error:
-            self._counts.refuse(f'{body_topic(name)}/{JOINTS}', error)
-        else:
             self._after()
 
     def _aim(self, name: str, angles: dict[str, float], rates: dict[str, float],
