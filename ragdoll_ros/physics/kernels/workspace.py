@@ -32,6 +32,12 @@ EXTERNAL_IMPULSE = np.dtype([
 origin; its center of mass before position correction, m; whether the ground bears it; whether
 another doll touches it."""
 
+ISLAND_SUMS = np.dtype([
+    ('mass', float), ('momentum', float, 3), ('moved', float, 3), ('on_ground', np.int64)],
+    align=True)
+"""Of the dolls of an island that touch others: mass, kg; momentum at a step's end, N s; mass times
+the displacement by position correction, kg m; whether the ground bears any."""
+
 BRACKET = np.dtype([('low', float), ('high', float), ('moved', np.int64), ('halved_width', float),
                     ('chords', np.int64)], align=True)
 """Bracket of a time of impact, step lengths in s: ``low``, at whose end nothing has met, and
@@ -106,11 +112,12 @@ known; ``unknowns`` of newton.py, and a row of its matrix, ``combined``."""
 
 Step = collections.namedtuple(
     'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
-    'correction sums_before sums_after external bracket gaps_low gaps_high spin')
+    'correction sums_before sums_after external islands bracket gaps_low gaps_high spin')
 """A contact step or an impact: its kinematics at ``start``, ``middle`` and ``end``; coordinates and
 velocities there; ``v_free`` without contacts, ``v_change`` by contacts; ``correction`` (nv,): the
 displacement of position correction. ``sums_before``, ``sums_after``, ``external`` (d,): of the
-dolls. ``bracket`` (1,) with the gaps at its ends. ``spin`` (3,) rad/s: scratch."""
+dolls; ``islands`` (d,): of islands, at their labels. ``bracket`` (1,) with the gaps at its ends.
+``spin`` (3,) rad/s: scratch."""
 
 Flight = collections.namedtuple(
     'Flight', 'kinematics q v stages derivative contact_gaps motion')
@@ -142,6 +149,7 @@ def make_workspace(system: System, cluster: ClusterState) -> Workspace:
         q_end=np.zeros(nq), v_end=np.zeros(nv), v_free=np.zeros(nv), v_middle=np.zeros(nv),
         v_change=np.zeros(nv), correction=np.zeros(nv), sums_before=np.zeros(dolls, DOLL_SUMS),
         sums_after=np.zeros(dolls, DOLL_SUMS), external=np.zeros(dolls, EXTERNAL_IMPULSE),
+        islands=np.zeros(dolls, ISLAND_SUMS),
         bracket=np.zeros(1, BRACKET), gaps_low=np.zeros(gaps), gaps_high=np.zeros(gaps),
         spin=np.zeros(3))
     flight = Flight(

@@ -159,10 +159,13 @@ def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.n
     doll that is not on the ground has the momentum and center of mass that its external impulses
     give it.
 
-    Position correction may have moved dolls apart that touch each other: their spins make up for
-    what that changes of their angular momentum about the world's origin.
+    Position correction may have moved dolls apart that touch each other. In an island in the air
+    it must not move the common center of mass: that displacement is taken from all dolls alike.
+    Then their spins make up for what it changes of the angular momentum, with velocities relative
+    to that center.
     """
-    step, g = ws.step, vec(s.gravity)
+    step, label = ws.step, ws.island.label
+    sum_islands(s, ws, h)
     for i in range(len(s.tree)):
         body, d = s.tree[i], s.body_doll[i]
         if body.parent >= 0 or step.external[d].on_ground:
@@ -170,16 +173,21 @@ def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.n
         old, new, external, mass = (step.sums_before[d], step.sums_after[d], step.external[d],
                                     s.doll_masses[d])
         impulse, momentum, center = vec(external.impulse), vec(old.momentum), vec(new.center)
-        weight = mass * g[0] * h, mass * g[1] * h, mass * g[2] * h
-        due = add(add(momentum, impulse), weight)
+        due = due_momentum(s, ws, d, h)
         travel, twice = scale(h, add(momentum, due)), 2 * mass
         place = add(vec(old.center), divide(travel, twice))
         mean = add(vec(old.center), place)
         mean = mean[0] / 2, mean[1] / 2, mean[2] / 2
-        displacement = sub(place, vec(external.center) if external.touches_other else center)
-        moved = sub(add(center, displacement), place)
+        displacement, turning = sub(place, center), (0.0, 0.0, 0.0)
+        if external.touches_other:
+            displacement = sub(place, vec(external.center))
+            group = step.islands[label[d]]
+            if not group.on_ground:
+                displacement = add_scaled(displacement, -1 / group.mass, vec(group.moved))
+                turning = cross(sub(add(center, displacement), place),
+                                add_scaled(due, -mass / group.mass, vec(group.momentum)))
         spin = sub(sub(sub(add(vec(old.angular_momentum), vec(external.moment)),
-                           cross(mean, impulse)), cross(moved, due)), vec(new.angular_momentum))
+                           cross(mean, impulse)), turning), vec(new.angular_momentum))
         spin = locked_angular_velocity(ws, new, spin)
         gained = divide(sub(due, vec(new.momentum)), mass)
         at, dof = body.q_start, body.v_start
@@ -189,6 +197,33 @@ def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.n
             v[dof + k] += change[k]
             v[dof + 3 + k] += turn[k]
             q[at + k] += displacement[k]
+
+
+@compiled
+def due_momentum(s: System, ws: Workspace, d: int, h: float) -> Vec3:
+    """Momentum, N s, that doll d has after h s by its external impulses and weight."""
+    return add_scaled(add(vec(ws.step.sums_before[d].momentum), vec(ws.step.external[d].impulse)),
+                      s.doll_masses[d] * h, vec(s.gravity))
+
+
+@compiled
+def sum_islands(s: System, ws: Workspace, h: float) -> None:
+    """Write step.islands, the sums over the dolls of each island that touch others, after h s."""
+    islands, label = ws.step.islands, ws.island.label
+    for d in range(len(islands)):
+        group = islands[d]
+        group.mass, group.on_ground = 0.0, 0
+        for k in range(3):
+            group.momentum[k] = group.moved[k] = 0.0
+    for d in range(len(islands)):
+        external = ws.step.external[d]
+        if external.touches_other:
+            group, mass = islands[label[d]], s.doll_masses[d]
+            moved = sub(vec(ws.step.sums_after[d].center), vec(external.center))
+            group.mass += mass
+            group.on_ground |= external.on_ground
+            put(group.momentum, add(vec(group.momentum), due_momentum(s, ws, d, h)))
+            put(group.moved, add_scaled(vec(group.moved), mass, moved))
 
 
 @compiled
