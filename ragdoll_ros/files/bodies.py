@@ -1,6 +1,7 @@
 """`bodies:` of a scene, each alone or repeated: static ones, loose ones, which have a mass, and
 driven ones, which follow what they are told.
 """
+import dataclasses
 import itertools
 from pathlib import Path
 from typing import NamedTuple
@@ -8,13 +9,14 @@ from typing import NamedTuple
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange, WrongForm
 from ..model.follow import Follow
-from ..model.mesh import Surface
+from ..model.mesh import Hull, Surface
 from ..model.plane import Plane
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.robot import Robot
 from ..model.rotation import IDENTITY
 from ..model.scene import Placement
+from ..model.shapes import Part, Shape
 from ..model.static_body import DEFAULT_COLOR, StaticBody
 from ..model.vectors import floats
 from .doll import build_shape, shape_data
@@ -63,7 +65,7 @@ def build_bodies(data: dict, folder: Path, found: list[ModelError]) -> SceneBodi
                 static += itertools.islice(itertools.chain.from_iterable(
                     copy.bodies() for copy in copies), MOST_BODIES + 1)
         elif _moves(entry):
-            loose += _copies(try_build(found, where, _loose_body, entry), entry)
+            loose += _copies(try_build(found, where, _loose_body, entry, folder), entry)
         else:
             static += _copies(try_build(found, where, _static_body, entry, folder), entry)
         for made, made_by in ((static, bodies.static_entries), (loose, bodies.loose_entries)):
@@ -128,17 +130,19 @@ def _static_body(entry: dict, folder: Path) -> StaticBody:
     _check_options(entry)
     fields = {key: value for key, value in entry.items()
               if key not in ('shape', 'shapes', 'repeat')}
-    shape = build_surface(entry, folder) if surface_kind(entry) else build_shape(entry)
+    shape = build_surface(entry, folder) if surface_kind(entry) else build_shape(entry, folder)
     return StaticBody(shape=shape, **fields)
 
 
-def _loose_body(entry: dict) -> Placement:
+def _loose_body(entry: dict, folder: Path) -> Placement:
     """A doll of one bone: a uniform solid, its frame that of the body's shape."""
     _check_options(entry)
-    if kind := surface_kind(entry):
+    kind = surface_kind(entry)
+    if kind and kind != Hull.kind:
         key = 'mass' if 'mass' in entry else 'follow'
         raise WrongForm(key, entry[key], f'none: a {kind} never moves')
-    shape, follow = build_shape(entry), follow_of(entry)
+    shape: Shape | Compound
+    shape, follow = _moving_shape(entry, kind, folder), follow_of(entry)
     if 'mass' not in entry and follow and not follow.is_exact:
         raise WrongForm('follow', entry['follow'], 'a mass as well, which the force moves')
     # A bone's frame has its centre of mass and principal axes.
@@ -151,6 +155,15 @@ def _loose_body(entry: dict) -> Placement:
                 floats(pose.orientation), color=tuple(entry.get('color', DEFAULT_COLOR)), **surface)
     start = {key: entry[key] for key in ('position', 'orientation', *MOTION) if key in entry}
     return Placement(Ragdoll(entry['name'], (bone,)), follow=follow, **start)
+
+
+def _moving_shape(entry: dict, kind: str | None, folder: Path) -> Shape | Compound:
+    """The shape of a body that moves; one hull is a Compound of it."""
+    if kind is None:
+        return build_shape(entry, folder)
+    hull = build_surface(entry, folder)
+    assert isinstance(hull, Hull)
+    return Compound((Part(dataclasses.replace(hull, source=None)),))
 
 
 def _check_options(entry: dict) -> None:

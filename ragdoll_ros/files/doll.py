@@ -1,4 +1,5 @@
 """Dolls as YAML files (config/doll.schema.json): reading with all errors at once, writing."""
+import functools
 import math
 import os
 from collections.abc import Callable, Sequence
@@ -8,6 +9,7 @@ from typing import Any
 from ..model import ragdoll
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange
+from ..model.mesh import Hull
 from ..model.passive import Passive, PassiveEnd
 from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.rotation import IDENTITY
@@ -23,6 +25,7 @@ from .schema import (
     schema_errors,
     value_or_raise,
 )
+from .surfaces import build_hull, hull_data
 
 LARGEST_MASS_RATIO = 1e8
 """Largest ratio of two masses in a file. Robots have up to 6.1e7; at 2e8 a tick takes a second, as
@@ -149,18 +152,20 @@ def _shape(data: dict) -> Shape:
     return SHAPES[kind](**sizes)
 
 
-def _part(data: dict) -> Part:
-    kind, = SHAPES.keys() & data.keys()
-    return Part(_shape({kind: data[kind]}),
-                **{key: value for key, value in data.items() if key != kind})
+def _part(data: dict, folder: Path) -> Part:
+    kind, = {*SHAPES, Hull.kind} & data.keys()
+    shape = build_hull(data[kind], folder) if kind == Hull.kind else _shape({kind: data[kind]})
+    return Part(shape, **{key: value for key, value in data.items() if key != kind})
 
 
-def build_shape(data: dict) -> Shape | Compound:
-    """The shape of a bone or body that has ``shape`` or ``shapes``. Raises ModelError."""
+def build_shape(data: dict, folder: Path = Path('/')) -> Shape | Compound:
+    """The shape of a bone or body that has ``shape`` or ``shapes``; paths of hulls are relative to
+    ``folder``. Raises ModelError.
+    """
     if 'shape' in data:
         return _shape(data['shape'])
     found: list[ModelError] = []
-    parts = build_each(data, 'shapes', _part, found)
+    parts = build_each(data, 'shapes', functools.partial(_part, folder=folder), found)
     for error in found:
         raise error
     return Compound(tuple(parts))
@@ -209,7 +214,9 @@ def _passive_data(passive: Passive) -> dict:
             for key, end in (('lower', passive.lower), ('upper', passive.upper))}
 
 
-def _shape_data(shape: Shape) -> dict:
+def _shape_data(shape: Shape | Hull) -> dict:
+    if isinstance(shape, Hull):
+        return {shape.kind: hull_data(shape)}
     return {shape.kind: {key: list(value) if isinstance(value, tuple) else value
                          for key, value in vars(shape).items()}}
 

@@ -119,7 +119,7 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
                   diaginertia=_text(bone.inertia))
     # bit 0: collides with the ground and, with self_collision, with bones; bit 1: ground only
     mask = '1' if scene.self_collision else '2'
-    for number, part in enumerate(bone.shape.parts, 1):
+    for number, part in enumerate((part.boxed for part in bone.shape.parts), 1):
         at = {} if part.is_centred else {'pos': _text(part.position),
                                          'quat': _quaternion(part.orientation)}
         # A bone's own name has no slash.
@@ -148,7 +148,8 @@ def static_geoms(body: StaticBody) -> list[tuple[str, tuple[float, ...], Pose]]:
     """Type, size and pose in the world of each geom of a static body, in MuJoCo's form."""
     if isinstance(body.shape, Plane):
         return [('plane', UNLIMITED, body.pose)]
-    return [(part.kind, _size(part.shape), part.pose) for part in body.parts]
+    return [(part.kind, _size(part.shape), part.pose)
+            for part in (part.boxed for part in body.parts)]
 
 
 def _size(shape: Shape) -> tuple[float, ...]:

@@ -1,6 +1,7 @@
-"""Shapes that static bodies alone have: planes; height fields from numbers, .npy and pictures;
-meshes and their hulls.
+"""Shapes that static bodies alone have, planes, height fields from numbers, .npy and pictures, and
+meshes; and hulls of meshes, which move as parts of a Compound.
 """
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ PICTURES = ('.png', '.tif', '.tiff')
 
 
 def surface_kind(entry: dict) -> str | None:
-    """The kind of the shape of an entry of `bodies:`, if static bodies alone have it."""
+    """The kind of the shape of an entry of `bodies:`, if it is a surface or a plane."""
     shape = entry.get('shape')
     return next((kind for kind in (*SURFACES, Plane.kind)
                  if isinstance(shape, dict) and kind in shape), None)
@@ -39,6 +40,21 @@ def build_surface(entry: dict, folder: Path) -> Surface | Plane:
         return _mesh(kind, data, folder)
     except errors.ModelError as error:
         raise error.at('shape' if error.path.startswith(kind) else f'shape.{kind}') from None
+
+
+def build_hull(data: dict, folder: Path) -> Hull:
+    """The hull of a part of a body, without its file. Raises ModelError."""
+    try:
+        hull = _mesh(Hull.kind, data, folder)
+    except errors.ModelError as error:
+        raise error if error.path.startswith(Hull.kind) else error.at(Hull.kind) from None
+    assert isinstance(hull, Hull)
+    return dataclasses.replace(hull, source=None)
+
+
+def hull_data(hull: Hull) -> dict:
+    """A hull as numbers."""
+    return {'vertices': hull.vertices.tolist(), 'faces': hull.faces.tolist()}
 
 
 def surface_data(surface: Surface | Plane) -> dict:

@@ -127,7 +127,7 @@ def _link(bone: Bone, frame: Pose, dialect: str) -> list[str]:
 
 def _geometries(bone: Bone, pose: Pose, dialect: str) -> Iterator[tuple[Pose, str]]:
     """Pose and XML of each geometry of a bone."""
-    for part in bone.shape.parts:
+    for part in (part.boxed for part in bone.shape.parts):
         place = pose if part.is_centred else pose.compose(part.pose)
         if part.kind == 'capsule' and dialect == 'ros':
             # urdfdom has no capsule: a cylinder and two spheres.

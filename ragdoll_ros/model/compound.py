@@ -50,7 +50,7 @@ class Compound:
     @property
     def centroid(self) -> np.ndarray:
         """Centre of mass (3,) m."""
-        return self._mass_fractions() @ np.array([part.position for part in self.parts])
+        return self._mass_fractions() @ np.array([part.centroid for part in self.parts])
 
     @property
     def half_extents(self) -> Vector:
@@ -64,9 +64,10 @@ class Compound:
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """Those of all parts, to draw."""
+        """Those of all parts, to draw; hulls as they are."""
         return tuple(Part.at(piece.shape, part.pose.compose(piece.pose))
-                     for part in self.parts for piece in part.shape.primitives)
+                     for part in self.parts
+                     for piece in part.shape.primitives or (Part(part.shape),))
 
     def support(self, direction: np.ndarray) -> np.ndarray:
         """Support function (...,) m along unit directions (..., 3): maximum over the parts."""
@@ -79,8 +80,8 @@ class Compound:
         """Inertia (3, 3) kg m^2 about the origin, by the parallel axis theorem."""
         total = np.zeros((3, 3))
         for part, share in zip(self.parts, mass * self._mass_fractions(), strict=True):
-            axes, at = rotation.matrix(part.orientation), np.array(part.position)
-            total += axes * part.shape.inertia(share) @ axes.T
+            axes, at = rotation.matrix(part.orientation), part.centroid
+            total += part.shape.turned_inertia(share, axes)
             total += share * (at @ at * np.eye(3) - np.outer(at, at))
         return total
 

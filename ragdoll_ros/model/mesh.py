@@ -1,4 +1,4 @@
-"""Surfaces of triangles, for static bodies: a mesh, and a height field."""
+"""Surfaces of triangles: a mesh and a height field, for static bodies; a hull, which may move."""
 from __future__ import annotations
 
 import dataclasses
@@ -12,7 +12,8 @@ import numpy as np
 
 from . import errors
 from .errors import set_fields
-from .vectors import finite_floats, vector
+from .shapes import Solid
+from .vectors import Vector, finite_floats, vector
 
 MAX_TRIANGLES = 1_000_000
 
@@ -139,8 +140,10 @@ class Mesh(Surface):
 
 
 @dataclass(frozen=True, eq=False)
-class Hull(Mesh):
-    """A convex polyhedron. Raises WrongForm where a vertex is outside a face.
+class Hull(Mesh, Solid):
+    """A convex polyhedron, of uniform density as a part of a Compound, by which it may move.
+
+    Raises WrongForm where a vertex is outside a face.
 
     Args:
         vertices, faces, source: as of a Mesh; the surface is closed.
@@ -166,6 +169,50 @@ class Hull(Mesh):
                                        'a convex surface, its faces anticlockwise from outside')
         if (triangles.edges == OPEN).any():
             raise errors.WrongForm('hull', 'an edge without a second face', 'a closed surface')
+
+    @property
+    def volume(self) -> float:
+        """m^3."""
+        return self._mass_integrals[0]
+
+    @property
+    def centroid(self) -> Vector:
+        """Its centre of mass (3,) m."""
+        return self._mass_integrals[1]
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half edges (3,) m of its bounding box centred at the origin."""
+        return vector(np.abs(self.bounds).max(axis=0))
+
+    @property
+    def support_terms(self) -> tuple[float, ...]:
+        """Terms of its bounding box, an upper bound."""
+        return (*self.half_extents, 0.0, 0.0, 0.0)
+
+    def turned_inertia(self, mass: float, axes: np.ndarray) -> np.ndarray:
+        """Inertia (3, 3) kg m^2 about its centre of mass, its own ``axes`` being the columns."""
+        return mass * (axes @ self._mass_integrals[2] @ axes.T)
+
+    @functools.cached_property
+    def _mass_integrals(self) -> tuple[float, Vector, np.ndarray]:
+        """Volume, m^3; centre of mass (3,) m; inertia (3, 3) m^2 of 1 kg about it.
+
+        Sums over the tetrahedra between a point within and each triangle. Of one with the corners
+        0, a, b, c the integral of x x^T is det(a, b, c) (s s^T + a a^T + b b^T + c c^T) / 120,
+        s = a + b + c: Blow and Binstock, How to find the inertia tensor, 2004.
+        """
+        corners = self.triangles.corners
+        within = corners.mean(axis=(0, 1))
+        arms = corners - within
+        sums, dets = arms.sum(axis=1), np.linalg.det(arms)
+        volume = dets.sum() / 6
+        center = (dets @ sums) / 24 / volume
+        squares = (np.einsum('t,ti,tj->ij', dets, sums, sums)
+                   + np.einsum('t,tki,tkj->ij', dets, arms, arms)) / 120 / volume
+        squares -= np.outer(center, center)
+        return (float(volume), vector(within + center),
+                _frozen(np.trace(squares) * np.eye(3) - squares))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,10 +19,11 @@ import numpy as np
 from . import errors, rotation
 from .compound import Compound
 from .errors import set_fields
+from .mesh import Hull
 from .passive import Passive
 from .pose import Pose
 from .rotation import IDENTITY
-from .shapes import Shape
+from .shapes import Part, Shape
 from .surface import check_surface
 from .swing import Swing
 from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
@@ -42,7 +43,8 @@ class Bone:
 
     Args:
         name: unique in its doll, not 'world'.
-        shape: a Box, Capsule, Compound, Cylinder or Sphere; its axes are the bone's.
+        shape: a Box, Capsule, Compound, Cylinder or Sphere; its axes are the bone's. A Hull becomes
+            a Compound of it.
         mass: kg.
         position: (3,) m, the centre of mass in the doll's frame, bind pose.
         orientation: quaternion x, y, z, w, bone's axes (principal axes of inertia) to doll's.
@@ -74,6 +76,8 @@ class Bone:
     def __post_init__(self) -> None:
         set_fields(self, mass=float(self.mass), position=finite_floats('position', self.position),
                    orientation=unit_vector('orientation', self.orientation, count=4))
+        if isinstance(self.shape, Hull):
+            set_fields(self, shape=Compound((Part(self.shape),)))
         if self.name == WORLD:
             raise errors.DuplicateName('name', self.name, "a name other than the world frame's")
         errors.check_positive('mass', self.mass)
@@ -307,6 +311,12 @@ class Ragdoll:
     def largest_half_extents(self) -> np.ndarray:
         """(n,) m: the largest half extent of each bone."""
         return np.array([max(bone.shape.half_extents) for bone in self.bones])
+
+    @cached_property
+    def hulls(self) -> tuple[str, ...]:
+        """Names of the bones that have a hull."""
+        return tuple(bone.name for bone in self.bones
+                     if any(isinstance(part.shape, Hull) for part in bone.shape.parts))
 
     @cached_property
     def extent(self) -> float:

@@ -1,6 +1,6 @@
 """Primitive shapes of bones: sphere, box, cylinder, capsule. Uniform solids in their own axes, m.
 
-A bone of several shapes has a Compound (compound.py).
+A bone of several shapes has a Compound (compound.py), of which some may be hulls (mesh.py).
 """
 from __future__ import annotations
 
@@ -35,6 +35,12 @@ class Solid:
 
     kind: ClassVar[str]
     support_terms: property
+    centroid: ClassVar[Vector] = (0.0, 0.0, 0.0)
+    """Its centre of mass (3,) m, in its own axes."""
+
+    def turned_inertia(self, mass: float, axes: np.ndarray) -> np.ndarray:
+        """Inertia (3, 3) kg m^2 about its centre of mass, its own ``axes`` being the columns."""
+        return axes * self.inertia(mass) @ axes.T
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -56,8 +62,8 @@ class Part:
     """A primitive shape of a Compound at a pose. Raises WrongForm, NotFinite, NotUnit.
 
     Args:
-        shape: a Sphere, Box, Cylinder or Capsule.
-        position: (3,) m, its centre.
+        shape: a Sphere, Box, Cylinder, Capsule or Hull.
+        position: (3,) m, its centre; of a Hull its origin.
         orientation: quaternion x, y, z, w, part's axes to compound's axes; normalised.
 
     Example:
@@ -73,7 +79,7 @@ class Part:
         set_fields(self, position=finite_floats('position', self.position),
                    orientation=unit_vector('orientation', self.orientation, count=4))
         if not isinstance(self.shape, Solid):
-            raise errors.WrongForm('shape', self.shape, 'one of ' + ', '.join(SHAPES))
+            raise errors.WrongForm('shape', self.shape, 'one of ' + ', '.join((*SHAPES, 'hull')))
 
     @classmethod
     def at(cls, shape: Shape, pose: Pose) -> Part:
@@ -90,6 +96,22 @@ class Part:
     def kind(self) -> str:
         """Its shape's kind."""
         return self.shape.kind
+
+    @property
+    def centroid(self) -> np.ndarray:
+        """Its centre of mass (3,) m, in the compound's axes."""
+        if not any(self.shape.centroid):
+            return np.array(self.position)
+        return self.pose.apply(np.array(self.shape.centroid))
+
+    @property
+    def boxed(self) -> Part:
+        """Itself, or of a hull the box around it: for formats that have no hulls."""
+        if self.kind in SHAPES:
+            return self
+        lower, upper = self.shape.bounds
+        return Part.at(Box(vector(upper - lower)),
+                       self.pose.compose(Pose((lower + upper) / 2, np.array(IDENTITY))))
 
     @property
     def size(self) -> Vector:

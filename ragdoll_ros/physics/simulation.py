@@ -1001,7 +1001,8 @@ def _needed(scene: Scene) -> Iterator[Capability]:
         yield Capability.FIXED_ROOTS
     if any(placement.motors for placement in scene.dolls):
         yield Capability.JOINT_SPRINGS
-    if any(isinstance(body.shape, Surface) for body in scene.bodies):
+    if any(isinstance(part.shape, Surface) for body in (*scene.bodies, *scene.bones)
+           for part in (body, *body.shape.parts)):
         yield Capability.SURFACES
 
 

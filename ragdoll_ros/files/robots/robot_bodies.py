@@ -14,7 +14,7 @@ from ...model import errors
 from ...model.compound import Compound
 from ...model.errors import ModelError
 from ...model.follow import Follow
-from ...model.mesh import Mesh
+from ...model.mesh import Hull, Mesh
 from ...model.plane import Plane
 from ...model.pose import Pose
 from ...model.ragdoll import Bone, Ragdoll
@@ -157,18 +157,22 @@ def _bodies(link: UrdfLink, pose: Pose, entry: dict, folder: Path,
         if what != f'a <{PLANE}>':
             raise errors.WrongForm('', what, f'{INSTEAD.get(what, PRIMITIVES)}; leave the link out '
                                    f'by `without: [{link.name}]`')
-    solids: list[tuple[Shape, Pose]] = list(link.shapes)
+    solids: list[tuple[Shape | Hull, Pose]] = list(link.shapes)
     others: list[tuple[Plane | Mesh, Pose]] = [(Plane(), place) for place in link.planes]
     for mesh in link.meshes:
         shape, place = _mesh_shape(mesh, entry.get('meshes'), folder)
-        if isinstance(shape, Mesh):
+        if isinstance(shape, Hull) and 'follow' in entry:
+            solids.append((dataclasses.replace(shape, source=None), place))
+        elif isinstance(shape, Mesh):
             others.append((shape, place))
         else:
             solids.append((shape, place))
     if others and 'follow' in entry:
-        raise errors.WrongForm('', f'a {others[0][0].kind}', f'{PRIMITIVES}, or `meshes: box`: no '
-                               f'other moves; leave the link out by `without: [{link.name}]`')
-    found: list[tuple[Any, Pose]] = solids if len(solids) == 1 else [
+        raise errors.WrongForm('', f'a {others[0][0].kind}', f'{PRIMITIVES}, or `meshes: hull` or '
+                               '`box`: no other moves; leave the link out by '
+                               f'`without: [{link.name}]`')
+    is_one = len(solids) == 1 and not isinstance(solids[0][0], Hull)
+    found: list[tuple[Any, Pose]] = list(solids) if is_one else [
         (Compound(tuple(Part.at(shape, place) for shape, place in solids)), Pose())
     ] if solids else []
     return [StaticBody(f'{link.name}_{number}' if number > 1 else link.name, whole,

@@ -18,8 +18,8 @@ from ...model.ragdoll import DEFAULT_COLOR, Bone
 from ...model.scene import Scene
 from ...model.shapes import Part
 from ...model.state import State
-from .convert import poses_of, to_pose, to_vector
-from .markers import MARKER_TYPES, set_color
+from .convert import poses_of, to_pose
+from .markers import set_color, set_shape
 from .serialized import SerializedTemplate
 
 OPACITY = 0.15
@@ -96,8 +96,8 @@ def _marker(bone: Bone, header: Header) -> InteractiveMarker:
 
 def _part_marker(bone: Bone, part: Part) -> Marker:
     """Marker of a part of a bone; without a frame_id its pose is relative to the marker's."""
-    marker = Marker(type=MARKER_TYPES[part.kind], action=Marker.ADD)
-    marker.scale = to_vector([SCALE * side for side in part.size])
+    marker = Marker(action=Marker.ADD)
+    set_shape(marker, part, SCALE)
     marker.pose = to_pose((*part.position, *part.orientation))
     set_color(marker, (*(bone.color or DEFAULT_COLOR)[:3], OPACITY))
     return marker

@@ -9,6 +9,7 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from ...model import rotation, static_body
+from ...model.mesh import Hull
 from ...model.pose import Pose
 from ...model.push import Push
 from ...model.ragdoll import DEFAULT_COLOR, Ragdoll
@@ -130,8 +131,9 @@ def _part_markers(header: Header, doll: Ragdoll, name: str) -> tuple[list[Marker
     poses = sentinels(1, (len(parts), 7))
     markers = []
     for (bone, number, part), row in zip(parts, poses.tolist(), strict=True):
-        marker = Marker(header=header, ns=name + bone.name, id=number, type=MARKER_TYPES[part.kind],
-                        action=Marker.ADD, pose=to_pose(row), scale=to_vector(part.size))
+        marker = Marker(header=header, ns=name + bone.name, id=number, action=Marker.ADD,
+                        pose=to_pose(row))
+        set_shape(marker, part)
         set_color(marker, bone.color or DEFAULT_COLOR)
         markers.append(marker)
     return markers, poses
@@ -143,9 +145,9 @@ def _static_markers(header: Header, parts: Sequence[tuple[static_body.StaticBody
     poses = sentinels(1, (len(parts), 7))
     markers = []
     for number, ((body, part), row) in enumerate(zip(parts, poses.tolist(), strict=True)):
-        marker = Marker(header=header, ns=f'bodies/{body.name}', id=number,
-                        type=MARKER_TYPES[part.kind], action=Marker.ADD, pose=to_pose(row),
-                        scale=to_vector(part.size))
+        marker = Marker(header=header, ns=f'bodies/{body.name}', id=number, action=Marker.ADD,
+                        pose=to_pose(row))
+        set_shape(marker, part)
         set_color(marker, body.color or static_body.DEFAULT_COLOR)
         markers.append(marker)
     return markers, poses
@@ -156,12 +158,9 @@ def _surface_markers(header: Header, bodies: Sequence[static_body.StaticBody]
     """Markers of static bodies that are surfaces or planes, with nothing that changes."""
     markers = []
     for body in bodies:
-        vertices, faces = body.shape.mesh()
-        points = [to_point(vertex) for vertex in vertices]
-        marker = Marker(header=header, ns=f'bodies/{body.name}', type=Marker.TRIANGLE_LIST,
-                        action=Marker.ADD, pose=to_pose((*body.position, *body.orientation)),
-                        scale=to_vector((1.0, 1.0, 1.0)))
-        marker.points = [points[index] for index in faces.ravel().tolist()]
+        marker = Marker(header=header, ns=f'bodies/{body.name}', action=Marker.ADD,
+                        pose=to_pose((*body.position, *body.orientation)))
+        set_triangles(marker, *body.shape.mesh())
         set_color(marker, body.color or static_body.DEFAULT_COLOR)
         markers.append(marker)
     return markers, np.zeros((len(markers), 0))
@@ -175,6 +174,23 @@ def _rod_marker(header: Header, ends: np.ndarray) -> tuple[list[Marker], np.ndar
     marker.points = [to_point(end) for end in ends]
     set_color(marker, BROWN)
     return [marker], ends.reshape(1, -1)
+
+
+def set_shape(marker: Marker, part: Part, scale: float = 1.0) -> None:
+    """Set a marker's type and size, ``scale`` times those of a part; of a hull its triangles."""
+    if isinstance(part.shape, Hull):
+        vertices, faces = part.shape.mesh()
+        set_triangles(marker, scale * vertices, faces)
+    else:
+        marker.type = MARKER_TYPES[part.kind]
+        marker.scale = to_vector([scale * side for side in part.size])
+
+
+def set_triangles(marker: Marker, vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Make a marker that of triangles (t, 3) between vertices (v, 3), m."""
+    marker.type, marker.scale = Marker.TRIANGLE_LIST, to_vector((1.0, 1.0, 1.0))
+    points = [to_point(vertex) for vertex in vertices]
+    marker.points = [points[index] for index in faces.ravel().tolist()]
 
 
 def set_color(marker: Marker, color: tuple[float, ...]) -> None:

@@ -1,4 +1,5 @@
-"""The bones, as instanced meshes: parts of one shape form batches, so that many cost little.
+"""The bones, as instanced meshes: parts of one shape form batches, so that many cost little. A hull
+is a batch by itself.
 
 A batch in which nothing has moved is not sent: among a thousand resting dolls one that moves costs
 only the batches that it is in.
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
+from ...model.mesh import Hull
 from ...model.pose import Pose
 from ...model.ragdoll import DEFAULT_COLOR
 from ...model.scene import Scene
@@ -19,7 +21,7 @@ from ...model.shapes import Part
 from ...model.state import State
 from ..viser_internals import set_poses
 from .joint_balls import joint_balls
-from .meshes import COARSE, MESHES
+from .meshes import COARSE, MESHES, faceted
 
 OPACITY = 0.45
 """Of bones below a visible skin."""
@@ -61,6 +63,11 @@ class Bodies:
                  for part in bone.shape.primitives]
         self._meshes = MESHES if len(parts) <= CROWD else COARSE
         colors = np.array([(bone.color or DEFAULT_COLOR)[:3] for bone in scene.bones])
+        for index, part in parts:
+            if isinstance(part.shape, Hull):
+                self.batches.append(self._batch(
+                    f'/scene/bodies/hull_{len(self.batches)}', [(index, part)], index in skinned,
+                    colors[[index]], state))
         for kind, below_skin in itertools.product(MESHES, (False, True)):
             selected = [(index, part) for index, part in parts
                         if part.kind == kind and (index in skinned) == below_skin]
@@ -88,9 +95,12 @@ class Bodies:
             np.array([part.position for part in parts]),
             np.array([part.orientation for part in parts]))
         positions, wxyzs = _part_poses(state, bones, local_pose)
+        mesh, scales = self._meshes.get(kind), np.array([part.size for part in parts])
+        if isinstance(parts[0].shape, Hull):
+            mesh, scales = faceted(*parts[0].shape.mesh()), np.ones((1, 3))
+        assert mesh
         handle = self._server.scene.add_batched_meshes_simple(
-            name, *self._meshes[kind], wxyzs, positions,
-            batched_scales=np.array([part.size for part in parts]),
+            name, *mesh, wxyzs, positions, batched_scales=scales,
             batched_colors=np.round(linear(colors) * 255).astype(np.uint8), lod='off')
         return Batch(kind, skinned, handle, bones, local_pose)
 

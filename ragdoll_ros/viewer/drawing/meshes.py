@@ -30,6 +30,11 @@ def box() -> Mesh:
     return np.array(corners), np.array(faces)
 
 
+def faceted(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
+    """A mesh whose faces are shaded flat: none shares a vertex."""
+    return vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)
+
+
 def soft_box() -> Mesh:
     """A box with edges of 1 m that are shaded as round."""
     corners, _ = box()

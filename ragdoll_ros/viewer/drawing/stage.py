@@ -7,6 +7,7 @@ import numpy as np
 import viser
 
 from ...model import rotation
+from ...model.mesh import Hull
 from ...model.plane import Plane
 from ...model.scene import Scene
 from ...model.static_body import DEFAULT_COLOR
@@ -118,6 +119,13 @@ def draw_static_bodies(server: viser.ViserServer, scene: Scene) -> None:
                 batched_scales=np.array([part.size for part in own]),
                 batched_colors=np.round(linear(np.array(colors)) * 255).astype(np.uint8),
                 lod='off')
+    for number, (part, color) in enumerate(parts):
+        if isinstance(part.shape, Hull):
+            vertices, faces = part.shape.mesh()
+            server.scene.add_mesh_simple(
+                f'/scene/static/hull_{number}', vertices.astype(np.float32),
+                faces.astype(np.uint32), color=color[:3], flat_shading=True,
+                wxyz=np.array(part.orientation)[WXYZ], position=part.position)
     for index, body in enumerate(scene.bodies):
         if not body.shape.primitives:
             red, green, blue = (body.color or DEFAULT_COLOR)[:3]

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...model import errors
 from ...model.compound import Compound
+from ...model.mesh import Hull
 from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.scene import Scene
 from ...model.shapes import SHAPES, Part, Shape
@@ -95,8 +96,13 @@ def _orientation(q: Quaternion) -> Quaternion:
 def _shape(shape: Shape | Compound) -> Shape | Compound:
     """Mirror image in the body's frame; primitive shapes are symmetric."""
     return shape if shape.kind in SHAPES else Compound(tuple(
-        Part(part.shape, _point(part.position, 0.0), _orientation(part.orientation))
+        Part(_hull(part.shape) if isinstance(part.shape, Hull) else part.shape,
+             _point(part.position, 0.0), _orientation(part.orientation))
         for part in shape.parts))
+
+
+def _hull(hull: Hull) -> Hull:
+    return Hull(hull.vertices * (1, -1, 1), hull.faces[:, ::-1])
 
 
 def _other_word(match: re.Match) -> str:

@@ -28,6 +28,7 @@ from .doll_states import SNAPSHOT, DollStates, contact_capacity
 from .impact_records import join_impacts, logged_impacts
 from .islands import LARGE_CLUSTER, next_window
 from .static_geoms import NO_KEYS, StaticGeoms
+from .triangle_geoms import is_of_hull
 
 SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'contacts_dropped',
                 'toi_failures', 'restitution_reduced', 'energy_gains', 'work_pushes', 'work_grabs',
@@ -669,23 +670,31 @@ class Clusters:
         geoms = np.repeat(begin - np.cumsum(count) + count, count) + np.arange(count.sum())
         place = np.repeat(place, count)
         pairs = np.stack([geoms, len(bone_of_geom) + place], 1)
-        kinds = np.concatenate([system.geoms['kind'] for system in systems])[geoms]
-        repeats = self.static_geoms.pair_counts(kinds, static_geoms[place])
+        touching = np.concatenate([system.geoms[['kind', 'point_count']] for system in systems])
+        repeats = self.static_geoms.pair_counts(touching[geoms], static_geoms[place])
         points = np.arange(repeats.sum()) - np.repeat(np.cumsum(repeats) - repeats, repeats)
         return np.repeat(pairs, repeats, axis=0), points, static_geoms
 
 
 def _pairs_of_dolls(dolls: np.ndarray, systems: list[System], pairs: np.ndarray) -> np.ndarray:
     """All pairs (p, 2) of the geoms of ``dolls`` (d,) with the ``systems`` that ``pairs`` (k, 2)
-    of dolls connect; geoms count through all systems.
+    of dolls connect; geoms count through all systems. Those of a geom with a hull follow each
+    other; hulls do not meet hulls.
     """
     firsts = np.cumsum([0, *(len(system.geoms) for system in systems)])
     place = {int(doll): k for k, doll in enumerate(dolls)}
-    return np.concatenate([NO_PAIRS, *(
-        np.stack(np.meshgrid(np.arange(firsts[a], firsts[a + 1]),
-                             np.arange(firsts[b], firsts[b + 1]), indexing='ij'), -1)
-        .reshape(-1, 2) for one, other in pairs
-        for a, b in [(place[int(one)], place[int(other)])])])
+    of_hull = np.concatenate([is_of_hull(system.geoms) for system in systems])
+    found = [NO_PAIRS]
+    for one, other in pairs:
+        a, b = (np.arange(firsts[k], firsts[k + 1]) for k in (place[int(one)], place[int(other)]))
+        found.append(_every_pair(a[~of_hull[a]], b))
+        found.append(_every_pair(b[~of_hull[b]], a[of_hull[a]]))
+    return np.concatenate(found)
+
+
+def _every_pair(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """All pairs (p, 2) of indices ``a`` and ``b``, those of one of ``a`` one after the other."""
+    return np.stack(np.meshgrid(a, b, indexing='ij'), -1).reshape(-1, 2)
 
 
 def _cluster_key(dolls: np.ndarray, pairs: np.ndarray, keys: np.ndarray) -> tuple:

@@ -12,19 +12,21 @@ from ....model.scene import Scene
 from ....model.scene_change import SceneChange
 from ....model.shapes import Part, support_distance
 from ....model.static_body import StaticBody
-from ...kernels.collision.shapes import PLANE, SHAPE_KIND
+from ...kernels.collision.shapes import HULL, PLANE, SHAPE_KIND, TRIANGLE
 from ...kernels.dynamics.body import WORLD
 from ...kernels.loaded import aabb_tree
 from ...kernels.system import GEOM
 from .build_system import GROUND_POINTS, bounding_radius, geom_size
-from .triangle_geoms import triangle_geoms
+from .triangle_geoms import is_of_hull, triangle_geoms
 
 LOOK_AHEAD = 0.1
 """s: what a bone may touch within this time is given to its cluster, when it has to be made anew;
 then it is made anew less often."""
 
-POINT_COUNTS = np.array([GROUND_POINTS[name] for name in sorted(SHAPE_KIND, key=SHAPE_KIND.get)])
-"""Points that may touch the ground or a plane, by the kind of shape."""
+POINT_COUNTS = np.array([*(GROUND_POINTS[name] for name in sorted(SHAPE_KIND, key=SHAPE_KIND.get)),
+                         0, 0, 0])
+"""Points that may touch the ground or a plane, by the kind of shape: none of triangles and planes;
+a hull has a number of its own."""
 
 NO_KEYS = np.zeros(0, np.int64)
 
@@ -37,18 +39,21 @@ class StaticGeoms:
     """
 
     def __init__(self, scene: Scene, reach: np.ndarray) -> None:
-        surfaces = [(index, body) for index, body in enumerate(scene.bodies)
-                    if isinstance(body.shape, Surface)]
         parts = [(index, part) for index, body in enumerate(scene.bodies) for part in body.parts]
+        surfaces = [(index, body.shape, body.pose) for index, body in enumerate(scene.bodies)
+                    if isinstance(body.shape, Surface)]
+        surfaces += [(index, part.shape, part.pose) for index, part in parts
+                     if isinstance(part.shape, Surface)]
+        parts = [(index, part) for index, part in parts if not isinstance(part.shape, Surface)]
         planes = [(index, body) for index, body in enumerate(scene.bodies)
                   if isinstance(body.shape, Plane)]
         own = [_primitive_geoms([part for _, part in parts]),
-               *(triangle_geoms(body.shape.triangles, body.pose) for _, body in surfaces)]
+               *(triangle_geoms(shape.triangles, pose) for _, shape, pose in surfaces)]
         self.geoms = np.concatenate([*(geoms for geoms, _, _ in own),
                                      _plane_geoms([body for _, body in planes])])
         """(g,): of primitive shapes, then triangles of surfaces, then planes."""
         self.bodies = np.concatenate([np.array([index for index, _ in parts], np.int64), *(
-            np.full(len(geoms), index) for (index, _), (geoms, _, _) in zip(
+            np.full(len(geoms), index) for (index, _, _), (geoms, _, _) in zip(
                 surfaces, own[1:], strict=True)),
             np.array([index for index, _ in planes], np.int64)])
         """(g,): index of each geom's body in the scene's bodies."""
@@ -98,11 +103,14 @@ class StaticGeoms:
         """The bones and the geoms (k,) of pairs."""
         return np.divmod(keys, max(1, len(self.geoms)))
 
-    def pair_counts(self, kinds: np.ndarray, geoms: np.ndarray) -> np.ndarray:
-        """Numbers of GEOM_PAIR records (k,) of geoms of these ``kinds`` with static ones: with a
-        plane one for each point that may touch it.
+    def pair_counts(self, moving: np.ndarray, geoms: np.ndarray) -> np.ndarray:
+        """Numbers of GEOM_PAIR records (k,) of ``moving`` geoms, their kinds and point counts, with
+        static ones: with a plane one for each point that may touch it. Hulls meet no surfaces.
         """
-        return np.where(self.geoms['kind'][geoms] == PLANE, POINT_COUNTS[kinds], 1)
+        kinds, static = moving['kind'], self.geoms['kind'][geoms]
+        points = np.where(kinds == HULL, moving['point_count'], POINT_COUNTS[kinds])
+        return np.where(static == PLANE, points,
+                        np.where(is_of_hull(moving) & (static == TRIANGLE), 0, 1))
 
     def clear(self) -> None:
         """Forget all pairs."""

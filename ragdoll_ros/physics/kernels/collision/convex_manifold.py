@@ -58,8 +58,8 @@ def _contact_axis(a: Shape, b: Shape, c: Vec3, margin: float) -> Axis:
 def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
     """Write the manifold of two boxes or cylinders; arguments and return value as collide()."""
     origin = b.position
-    a = Shape(a.kind, a.size, sub(a.position, origin), a.rotation, a.edges)
-    b = Shape(b.kind, b.size, (0.0, 0.0, 0.0), b.rotation, b.edges)
+    a = Shape(a.kind, a.size, sub(a.position, origin), a.rotation, a.edges, 0)
+    b = Shape(b.kind, b.size, (0.0, 0.0, 0.0), b.rotation, b.edges, 0)
     s, n = _contact_axis(a, b, a.position, margin)
     if s > margin:
         return 0

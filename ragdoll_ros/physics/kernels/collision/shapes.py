@@ -3,9 +3,9 @@
 Kinds and sizes, m: sphere (radius, 0, 0); capsule (radius, half length of its axis, 0); box (half
 extents); cylinder (radius, half length, 0). The axis of a capsule or cylinder is its own z axis.
 These are symmetric about their centre, so that their support functions are even. A triangle, of a
-static surface, is not, and has functions of its own: see triangles/triangle.py. A plane through its
+surface, is not, and has functions of its own: see triangles/triangle.py. A plane through its
 position, its z axis the normal, is no shape of these functions: contact/gaps.py treats it as the
-ground.
+ground. Nor is a hull, which has a bounding sphere and vertices; its triangles collide.
 """
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..dynamics.body import WORLD
 from ..maths.vectors import Vec3, divide, norm, to_local, to_world, vec
 
-SPHERE, CAPSULE, BOX, CYLINDER, TRIANGLE, PLANE = 0, 1, 2, 3, 4, 5
+SPHERE, CAPSULE, BOX, CYLINDER, TRIANGLE, PLANE, HULL = 0, 1, 2, 3, 4, 5, 6
 """Kinds of shapes. Spheres and capsules, which are a core with a radius, come first."""
 
 SHAPE_KIND = {'sphere': SPHERE, 'capsule': CAPSULE, 'box': BOX, 'cylinder': CYLINDER}
@@ -25,8 +26,8 @@ SHAPE_KIND = {'sphere': SPHERE, 'capsule': CAPSULE, 'box': BOX, 'cylinder': CYLI
 
 
 class Shape(NamedTuple):
-    """A shape at a pose: kind, size, centre (m, world), rotation matrix (3, 3) to the world, and
-    the edges of a triangle.
+    """A shape at a pose: kind, size, centre (m, world), rotation matrix (3, 3) to the world, the
+    edges of a triangle, and whether it is of a hull that moves.
     """
 
     kind: int
@@ -34,12 +35,14 @@ class Shape(NamedTuple):
     position: Vec3
     rotation: np.ndarray
     edges: Vec3 = (0.0, 0.0, 0.0)
+    is_of_hull: int = 0
 
 
 @compiled
 def shape_at(geom: np.record, position: np.ndarray, rotation: np.ndarray) -> Shape:
     """The shape of a geom whose centre (3,), m, and rotation (3, 3) in the world are given."""
-    return Shape(geom.kind, vec(geom.size), vec(position), rotation, vec(geom.edges))
+    return Shape(geom.kind, vec(geom.size), vec(position), rotation, vec(geom.edges),
+                 int(geom.body != WORLD))
 
 
 @compiled

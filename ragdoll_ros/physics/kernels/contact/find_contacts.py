@@ -80,7 +80,8 @@ def write_ground_contact(s: System, kin: Kinematics, k: int, point: int, normal:
     geom = s.geoms[k]
     c.kind = ROLLING if law.rolling_friction > 0 else FRICTIONAL
     c.body_a, c.body_b = geom.body, WORLD
-    put(c.point, ground_point(geom, point, kin.geom_positions[k], kin.geom_rotations[k], normal))
+    put(c.point, ground_point(s, geom, point, kin.geom_positions[k], kin.geom_rotations[k],
+                              normal))
     put(c.normal, normal)
     high = -offset
     for e in range(3):
@@ -123,9 +124,13 @@ def add_pair_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
             continue
         c.kind = ROLLING if pair.rolling_friction > 0 else FRICTIONAL
         c.body_a, c.body_b, c.id = a.body, b.body, first_id + at.feature_id
-        if b.kind == TRIANGLE and at.feature_id < ON_FACE:
+        if b.kind == TRIANGLE and b.body == WORLD and at.feature_id < ON_FACE:
             c.id = id_on_plane(s, pair.a, vec(at.normal), at.feature_id)
-        c.patch = len(s.geoms) + k
+        # Of a hull's flat face all triangles have one patch, and a corner on it one id.
+        face = a.face + b.face
+        if face and at.feature_id < ON_FACE:
+            c.id -= IDS_PER_PAIR * face
+        c.patch = len(s.geoms) + k - face
         put(c.point, vec(at.point))
         put(c.normal, vec(at.normal))
         c.gap, c.friction, c.rolling_friction = at.gap, pair.friction, pair.rolling_friction

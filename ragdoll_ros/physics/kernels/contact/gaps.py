@@ -2,7 +2,8 @@
 
 In order: heights of each geom's ground points, m; distances of each limited joint from its lower
 and its upper limit, rad; separations of the pairs of geoms, m, where they are far a lower bound,
-and NEAR at internal edges; in a step, those of the points of pairs that touch (point_gaps.py).
+EXCLUDED with a hull, whose triangles have their own, and NEAR at internal edges; in a step, those
+of the points of pairs that touch (point_gaps.py).
 """
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import math
 import numpy as np
 
 from ..collision.narrow_phase import separation
-from ..collision.shapes import BOX, CAPSULE, PLANE, SPHERE, extent
+from ..collision.shapes import BOX, CAPSULE, HULL, PLANE, SPHERE, extent
 from ..compiling.decorators import compiled
 from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics, body_velocity, forward_kinematics, place_geoms
@@ -88,7 +89,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
             for j in range(s.geoms[k].point_count):
                 out[n + j] = EXCLUDED
         elif s.geoms[k].point_count and s.ground_offset[0] > -math.inf:
-            ground_gaps(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k],
+            ground_gaps(s, s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k],
                         vec(s.ground_normal), s.ground_offset[0], s.geoms[k].first_point, out)
         n += s.geoms[k].point_count
     for k in range(len(s.joint_limits)):
@@ -102,6 +103,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
         for i in range(len(s.tree)):
             velocity, motion[i].angular_speed = body_velocity(kin, i)
             motion[i].speed = norm(velocity)
+    far_until, hull_gap = 0, 0.0
     for k in range(len(s.pairs)):
         if k < len(ws.excluded) and ws.excluded[k]:
             out[n + k] = EXCLUDED
@@ -116,8 +118,15 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
             if s.pairs[k].point == 0:
                 normal, offset = plane_of(kin, s.pairs[k].b)
                 i = s.pairs[k].a
-                ground_gaps(a, kin.geom_positions[i], kin.geom_rotations[i], normal, offset, n + k,
-                            out)
+                ground_gaps(s, a, kin.geom_positions[i], kin.geom_rotations[i], normal, offset,
+                            n + k, out)
+            continue
+        if a.kind == HULL or b.kind == HULL:
+            out[n + k], hull_gap = EXCLUDED, bounding_gap(s, k, kin)
+            far_until = k + 1 + a.triangles + b.triangles if hull_gap > NEAR else 0
+            continue
+        if k < far_until:
+            out[n + k] = hull_gap
             continue
         least = before[n + k] - 2 * (geom_motion_bound(motion, a, h)
                                      + geom_motion_bound(motion, b, h))
@@ -178,8 +187,8 @@ def plane_of(kin: Kinematics, k: int) -> tuple[Vec3, float]:
 
 
 @compiled
-def ground_gaps(geom: np.record, position: np.ndarray, r: np.ndarray, normal: Vec3, offset: float,
-                first: int, out: np.ndarray) -> None:
+def ground_gaps(s: System, geom: np.record, position: np.ndarray, r: np.ndarray, normal: Vec3,
+                offset: float, first: int, out: np.ndarray) -> None:
     """Write the heights, m, of a geom's ground points to ``out`` from ``first`` on, in the order of
     ground_point(). ``position``, ``r``: the geom's pose; ``normal``, ``offset``: of the ground or a
     plane.
@@ -200,6 +209,9 @@ def ground_gaps(geom: np.record, position: np.ndarray, r: np.ndarray, normal: Ve
         for k in range(8):
             out[first + k] = (high + (a if k & 1 else -a) + (b if k & 2 else -b)
                               + (c if k & 4 else -c))
+    elif geom.kind == HULL:
+        for k in range(geom.point_count):
+            out[first + k] = high + dot(vec(s.vertices[geom.first_vertex + k]), (a, b, c))
     else:
         low = size[0] * math.sqrt(max(0.0, 1 - c * c))
         a, b, c = a * size[0], b * size[0], c * size[1]
@@ -217,10 +229,10 @@ def ground_gaps(geom: np.record, position: np.ndarray, r: np.ndarray, normal: Ve
 
 
 @compiled
-def ground_point(geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
+def ground_point(s: System, geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
                  normal: Vec3) -> Vec3:
     """Ground point k of a geom, world, m: of a sphere the lowest, of a capsule the lowest of each
-    end, of a box the corners, of each end of a cylinder the lowest and four of its rim.
+    end, of a box or hull the corners, of each end of a cylinder the lowest and four of its rim.
     """
     size = geom.size
     x = y = z = 0.0
@@ -232,6 +244,8 @@ def ground_point(geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
     if geom.kind == BOX:
         x, y, z = (size[0] if k & 1 else -size[0], size[1] if k & 2 else -size[1],
                    size[2] if k & 4 else -size[2])
+    elif geom.kind == HULL:
+        x, y, z = vec(s.vertices[geom.first_vertex + k])
     else:
         z, k = (size[1] if k >= 5 else -size[1]), k % 5
         if k == 0:
@@ -303,6 +317,8 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
     lower bound, by their bounding spheres or their extents along the line of their centers.
     """
     i, j = s.pairs[k].a, s.pairs[k].b
+    if s.geoms[i].kind == HULL or s.geoms[j].kind == HULL:
+        return EXCLUDED
     direction = sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))
     length = norm(direction)
     far = length - (s.geoms[i].bounding_radius + s.geoms[j].bounding_radius)
@@ -315,6 +331,14 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
         if far > NEAR:
             return far
     return separation(a, b, NEAR)
+
+
+@compiled
+def bounding_gap(s: System, k: int, kin: Kinematics) -> float:
+    """Separation, m, of the bounding spheres of pair k."""
+    i, j = s.pairs[k].a, s.pairs[k].b
+    return norm(sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))) - (
+        s.geoms[i].bounding_radius + s.geoms[j].bounding_radius)
 
 
 @compiled

@@ -119,7 +119,7 @@ def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
         found, gap = find_manifold(s, kin, k, contacts.manifold), EXCLUDED
         for j in range(found):
             gap = min(gap, contacts.manifold[j].gap)
-        if found == 0 or s.geoms[s.pairs[k].b].kind == TRIANGLE:
+        if found == 0 or TRIANGLE in (s.geoms[s.pairs[k].a].kind, s.geoms[s.pairs[k].b].kind):
             gap = pair_gap(s, k, kin)
         out[first + k] = past_internal_edges(s, ws, kin, k, gap)
         if out[first + k] > gap:

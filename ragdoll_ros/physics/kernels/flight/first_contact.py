@@ -64,7 +64,7 @@ def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarra
             for j in range(geom.point_count):
                 gap, closing = gaps[n + j] - contact[n + j], falling + w * geom.reach
                 if gap < FAR:
-                    point = ground_point(geom, j, kin.geom_positions[k], kin.geom_rotations[k],
+                    point = ground_point(s, geom, j, kin.geom_positions[k], kin.geom_rotations[k],
                                          normal)
                     closing = -normal_velocity(s, kin, q, geom.body, point, normal)
                 least = min(least, time_to_close(gap, closing, acceleration))
@@ -96,8 +96,8 @@ def pair_time_to_close(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
     a, b = s.geoms[pair.a], s.geoms[pair.b]
     if b.kind == PLANE and gap < FAR:
         normal, _ = plane_of(kin, pair.b)
-        point = ground_point(a, pair.point, kin.geom_positions[pair.a], kin.geom_rotations[pair.a],
-                             normal)
+        point = ground_point(s, a, pair.point, kin.geom_positions[pair.a],
+                             kin.geom_rotations[pair.a], normal)
         closing = -normal_velocity(s, kin, q, a.body, point, normal)
         return time_to_close(gap - contact, closing, acceleration)
     if b.kind != PLANE and gap < NEAR:

@@ -8,6 +8,7 @@ import numpy as np
 import viser
 
 from ....model import rotation
+from ....model.mesh import Hull
 from ....model.pose import Pose
 from ....model.ragdoll import Bone, Joint
 from ....model.scene import Placement, Scene, height
@@ -125,9 +126,13 @@ class BodyHandles:
     def _add_outline(self, node: str, bone: Bone) -> viser.FrameHandle:
         frame = self._add_frame(node, bone.position, bone.orientation)
         for number, part in enumerate(bone.shape.primitives):
-            vertices, faces = MESHES[part.kind]
+            if isinstance(part.shape, Hull):
+                vertices, faces = part.shape.mesh()
+            else:
+                vertices, faces = MESHES[part.kind]
+                vertices = vertices * part.size
             self._server.scene.add_mesh_simple(
-                f'{node}/outline_{number}', vertices * part.size * OUTLINE_SCALE, faces,
+                f'{node}/outline_{number}', vertices * OUTLINE_SCALE, faces,
                 color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False,
                 position=part.position, wxyz=_wxyz(part.orientation))
         return frame

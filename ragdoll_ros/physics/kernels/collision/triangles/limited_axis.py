@@ -8,13 +8,14 @@ The rim of a cylinder against an edge is taken for less apart than it is.
 """
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from ...compiling.decorators import compiled
 from ...maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, sub)
 from ..shapes import BOX, CAPSULE, CYLINDER, SPHERE, Shape, core_extent
-from .triangle import (Corners, allowed_at_edge, corners_of, edge_vectors, is_allowed_at_corner,
-                       outward_vectors, seen_from_below, supporting_corner)
+from .triangle import (FLAT, Corners, allowed_at_edge, corners_of, edge_vectors,
+                       is_allowed_at_corner, outward_vectors, seen_from_below, supporting_corner)
 
 FACE, FIRST_CORNER = -1, 3
 """Features of a triangle: its face; its edges 0 to 2; its corners from FIRST_CORNER on."""
@@ -37,8 +38,9 @@ SHALLOW = 1e-3
 class LimitedAxis(NamedTuple):
     """``distance``, m: the largest separation of all. ``allowed``: of those that the edges allow,
     along ``axis`` and between a and the ``feature`` of the triangle; ``face``: along the
-    ``normal``, which points to the side of a's center; ``edges``: of that side. All are of a's
-    core, without the radius of a sphere or capsule.
+    ``normal``, which points to the side of a's center; ``edges``: of that side. ``beyond``: the
+    largest from edges and corners at which the surface bends. All are of a's core, without the
+    radius of a sphere or capsule.
     """
 
     distance: float
@@ -48,6 +50,7 @@ class LimitedAxis(NamedTuple):
     face: float
     normal: Vec3
     edges: Vec3
+    beyond: float
 
 
 @compiled
@@ -109,9 +112,10 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
         normal, edges = neg(normal), seen_from_below(edges)
     face = core_separation(a, corners, c, normal)
     distance = allowed = face
-    axis, feature = normal, FACE
+    axis, feature, beyond = normal, FACE, -math.inf
     for k in range(3):
-        distance = max(distance, core_separation(a, corners, c, outward[k]))
+        found, bends = core_separation(a, corners, c, outward[k]), abs(edges[k]) > FLAT
+        distance, beyond = max(distance, found), max(beyond, found if bends else -math.inf)
         for turn in range(3):
             if a.kind == SPHERE and turn != 1:
                 continue
@@ -122,7 +126,7 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
             d = divide(d, length)
             d = neg(d) if dot(d, c) < 0 else d
             found = core_separation(a, corners, c, d)
-            distance = max(distance, found)
+            distance, beyond = max(distance, found), max(beyond, found if bends else -math.inf)
             limited = allowed_at_edge(d, normal, outward[k], edges[k])
             found = core_separation(a, corners, c, limited)
             if found > allowed:
@@ -138,10 +142,11 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
         d = divide(d, length)
         d = neg(d) if dot(d, c) < 0 else d
         found, corner = core_separation(a, corners, c, d), supporting_corner(corners, d)
-        distance = max(distance, found)
+        bends = abs(edges[corner]) > FLAT and abs(edges[(corner + 2) % 3]) > FLAT
+        distance, beyond = max(distance, found), max(beyond, found if bends else -math.inf)
         if found > allowed and is_allowed_from_a_side(d, normal, outward, edges, corner):
             allowed, axis, feature = found, d, FIRST_CORNER + corner
-    return LimitedAxis(distance, allowed, axis, feature, face, normal, edges)
+    return LimitedAxis(distance, allowed, axis, feature, face, normal, edges, beyond)
 
 
 @compiled
@@ -156,12 +161,15 @@ def is_beside(found: LimitedAxis, radius: float) -> bool:
 @compiled
 def triangle_separation(a: Shape, t: Shape) -> float:
     """Gap, m, of a shape and a triangle by the normals that its edges allow. Of what is beside it,
-    but near, this says how far it is from the triangle's plane, or from that of the next one.
+    but near, this says how far it is from the triangle's plane, or from that of the next one; of
+    what is beyond a bend of a hull, which is closed, that it does not touch it.
     """
     found, radius = limited_axis(a, t), core_radius(a)
     distance, gap = found.distance - radius, found.allowed - radius
     if is_beside(found, radius):
         return max(distance, -BARELY)
+    if t.is_of_hull and found.beyond > radius:
+        return max(distance, gap)
     if distance > gap:
         share = min(max(distance / REACH, 0.0), 1.0)
         return max(gap, distance - REACH, BARELY * share * share + min(max(distance, -BARELY), 0.0))

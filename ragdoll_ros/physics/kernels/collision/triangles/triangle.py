@@ -1,4 +1,4 @@
-"""A triangle of a static surface, and which normals its edges allow.
+"""A triangle of a surface, and which normals its edges allow.
 
 Its frame: the centroid is the origin, z the normal, x along its first edge. ``size``, m: x of the
 first corner, length of the first edge, y of the third corner.

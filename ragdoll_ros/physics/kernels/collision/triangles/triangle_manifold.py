@@ -47,7 +47,7 @@ def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -
     if a.kind >= BOX and s < found.face + FACE_BIAS + FACE_BIAS_RATIO * abs(s):
         s, n, feature = found.face, found.normal, FACE
     if feature == FACE:
-        count, clipped = clip_by_triangle(a, arm, corners, found, scratch)
+        count, clipped = clip_by_triangle(a, arm, corners, found, t.is_of_hull != 0, scratch)
     elif a.kind >= BOX and face_cosine(a, n) >= FACE_COSINE:
         count = clipped = clip_triangle(a, arm, corners, n, scratch)
     else:
@@ -110,11 +110,12 @@ def put_corners(corners: Corners, factor: float, out: np.ndarray) -> None:
 
 
 @compiled
-def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
+def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis, is_of_hull: bool,
                      scratch: np.ndarray) -> tuple[int, int]:
     """Clip what of a's core supports against the triangle's normal by the triangle. Writes the
     points to ``scratch`` from MAX_CLIPPED on. Returns their number, and how many there were before
-    those were left out that the next triangle has.
+    those were left out that the next triangle has: of the triangles of a hull's face that share a
+    corner, one has it.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
     sides, n, number, face = scratch[2 * MAX_CLIPPED:], found.normal, 0, 0
@@ -132,7 +133,10 @@ def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
     count = 0
     for i in range(number):
         vertex, before = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
-        if goes_on(found.edges, before) or goes_on(found.edges, vertex.feature_id):
+        has_next = goes_on(found.edges, before)
+        if is_of_hull and before >= MAX_CORNERS and vertex.feature_id >= MAX_CORNERS:
+            has_next = False
+        if has_next or goes_on(found.edges, vertex.feature_id):
             continue
         height = dot(n, vec(vertex.point))
         put(points[count].point, add_scaled(vec(vertex.point), -(height / 2), n))
