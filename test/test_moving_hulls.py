@@ -146,7 +146,7 @@ def test_a_driven_hull_pushes_as_a_box_does(kind, accuracy):
         0.6, accuracy, twist) for robot in (hull_of(), Box(SIZE)))
     assert box[-1, 0, 0] > 0.2 and same > 0.5
     np.testing.assert_allclose(hull[..., :3], box[..., :3], atol=APART[accuracy])
-    assert work == pytest.approx(same, rel=0.05)
+    assert work == pytest.approx(same, rel=0.1)
 
 
 def test_contacts_of_a_driven_hull_are_those_of_a_box():
@@ -241,19 +241,19 @@ def test_a_robot_of_meshes_hits_a_person_and_the_blow_is_reported(tmp_path, arm)
     (tmp_path / 'world.yaml').write_text(
         'ground: {}\nmaterial: {friction: 0.6, restitution: 0}\n'
         f'dolls: [{{doll: man, position: [0.45, 0, 0]}}]\nbodies: [{ENTRY}]\n')
-    speed, blows, touching = 4.0, [], set()
+    speed, blows = 4.0, []
     with Simulation(load_scene(tmp_path / 'world.yaml')) as simulation:
-        names = simulation.scene.bone_names
         simulation.record_impacts(load_limits())
         for tick in range(50):
             simulation.drive_body('arm', joint_angles={'shoulder': 0.01 * speed * tick},
                                   rates={'shoulder': speed})
             simulation.advance()
             blows += simulation.impacts
-            touching |= {names[b] for b in simulation.contacts.b if b >= 0}
-        work, _ = simulation.work
+        (work, _), pressed = simulation.work, simulation.contact_impulses[-2:]
     hits = [blow for blow in blows if blow.against.startswith('arm_')]
-    assert hits and work > 1 and touching & {'arm_upper/arm_upper', 'arm_hand/arm_hand'}
+    assert hits and work > 10
+    # What moves by y is pushed by y, by more than the first blow.
+    assert -pressed[:, 1].sum() > hits[0].impulse > 5
     # The first blow is on one at rest; no point of the arm is farther than 0.92 m from the axis.
     assert 0.5 * speed * 0.8 < hits[0].speed < speed * 0.92
 

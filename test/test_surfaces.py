@@ -338,9 +338,10 @@ def test_a_hull_is_convex_and_closed():
 
 @pytest.mark.parametrize('text, told', [
     ('{hull: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]}}', 'around a volume'),
-    ('{hull: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]}}, mass: 3',
-     'a hull never moves')])
-def test_what_is_no_hull_is_refused(tmp_path, text, told):
+    ('{mesh: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces: [[0, 1, 2]]}}, mass: 3',
+     'a mesh never moves'),
+    ('{plane: {}}, follow: exact', 'a plane never moves')])
+def test_what_is_no_hull_or_may_not_move_is_refused(tmp_path, text, told):
     pytest.importorskip('trimesh')
     file = tmp_path / 'wrong.yaml'
     file.write_text(f'dolls: [{{doll: doll}}]\nbodies: [{{name: stone, shape: {text}}}]\n')
