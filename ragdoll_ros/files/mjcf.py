@@ -16,6 +16,7 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from ..model import rotation
+from ..model.mesh import boxed
 from ..model.plane import Plane
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Joint, joint_axes
@@ -119,7 +120,7 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
                   diaginertia=_text(bone.inertia))
     # bit 0: collides with the ground and, with self_collision, with bones; bit 1: ground only
     mask = '1' if scene.self_collision else '2'
-    for number, part in enumerate((part.boxed for part in bone.shape.parts), 1):
+    for number, part in enumerate(map(boxed, bone.shape.parts), 1):
         at = {} if part.is_centred else {'pos': _text(part.position),
                                          'quat': _quaternion(part.orientation)}
         # A bone's own name has no slash.
@@ -149,7 +150,7 @@ def static_geoms(body: StaticBody) -> list[tuple[str, tuple[float, ...], Pose]]:
     if isinstance(body.shape, Plane):
         return [('plane', UNLIMITED, body.pose)]
     return [(part.kind, _size(part.shape), part.pose)
-            for part in (part.boxed for part in body.parts)]
+            for part in map(boxed, body.parts)]
 
 
 def _size(shape: Shape) -> tuple[float, ...]:

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..model import rotation
+from ..model.mesh import boxed
 from ..model.per_doll import PerDoll
 from ..model.pose import Pose
 from ..model.ragdoll import DEFAULT_COLOR, WORLD, Bone, Joint, Ragdoll, joint_frame
@@ -127,7 +128,7 @@ def _link(bone: Bone, frame: Pose, dialect: str) -> list[str]:
 
 def _geometries(bone: Bone, pose: Pose, dialect: str) -> Iterator[tuple[Pose, str]]:
     """Pose and XML of each geometry of a bone."""
-    for part in (part.boxed for part in bone.shape.parts):
+    for part in map(boxed, bone.shape.parts):
         place = pose if part.is_centred else pose.compose(part.pose)
         if part.kind == 'capsule' and dialect == 'ros':
             # urdfdom has no capsule: a cylinder and two spheres.

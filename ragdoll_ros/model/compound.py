@@ -133,6 +133,11 @@ class Compound:
         return volumes / volumes.sum()
 
 
+def has_hull(shape: object) -> bool:
+    """Whether a shape is a Compound of which a part is a hull."""
+    return isinstance(shape, Compound) and any(part.kind == 'hull' for part in shape.parts)
+
+
 def principal_axes(inertia: np.ndarray) -> np.ndarray:
     """Orientation (4,) of the principal axes of an inertia (3, 3), permuted and signed to be
     nearest to the current axes.

@@ -12,7 +12,9 @@ import numpy as np
 
 from . import errors
 from .errors import set_fields
-from .shapes import Solid
+from .pose import Pose
+from .rotation import IDENTITY
+from .shapes import Box, Part, Solid
 from .vectors import Vector, finite_floats, vector
 
 MAX_TRIANGLES = 1_000_000
@@ -267,6 +269,15 @@ class HeightField(Surface):
     @functools.cached_property
     def _digest(self) -> bytes:
         return _digest(self.heights, self.size, self.source)
+
+
+def boxed(part: Part) -> Part:
+    """A part, or in place of a hull the box around it: for formats that have no hulls."""
+    if not isinstance(part.shape, Hull):
+        return part
+    lower, upper = part.shape.bounds
+    return Part.at(Box(vector(upper - lower)),
+                   part.pose.compose(Pose((lower + upper) / 2, np.array(IDENTITY))))
 
 
 SURFACES: dict[str, type] = {surface.kind: surface for surface in (HeightField, Mesh, Hull)}

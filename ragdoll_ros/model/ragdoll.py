@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from . import errors, rotation
-from .compound import Compound
+from .compound import Compound, has_hull
 from .errors import set_fields
 from .mesh import Hull
 from .passive import Passive
@@ -315,8 +315,7 @@ class Ragdoll:
     @cached_property
     def hulls(self) -> tuple[str, ...]:
         """Names of the bones that have a hull."""
-        return tuple(bone.name for bone in self.bones
-                     if any(isinstance(part.shape, Hull) for part in bone.shape.parts))
+        return tuple(bone.name for bone in self.bones if has_hull(bone.shape))
 
     @cached_property
     def extent(self) -> float:

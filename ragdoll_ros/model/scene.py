@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from . import errors, rotation
+from .compound import has_hull
 from .errors import set_fields
 from .follow import Follow
 from .forward_kinematics import BoneMotion, bone_motions
@@ -351,7 +352,7 @@ class Scene:
         first = yielding[0]
         where, name = f'dolls[{first}].doll', self.dolls[first].name
         for body in self.bodies:
-            if any(isinstance(part.shape, Surface) for part in (body, *body.shape.parts)):
+            if isinstance(body.shape, Surface) or has_hull(body.shape):
                 raise errors.WrongForm(where, f'{name}, which has a hull', (
                     f'other shapes beside the surface of {body.name}: hulls that are moved by '
                     'forces pass through meshes, height fields and hulls'))

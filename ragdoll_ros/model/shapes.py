@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
 from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
+
+if TYPE_CHECKING:
+    from .mesh import Hull
 
 SEGMENTS = 20
 """Vertices of a circle in a mesh."""
@@ -35,8 +38,15 @@ class Solid:
 
     kind: ClassVar[str]
     support_terms: property
-    centroid: ClassVar[Vector] = (0.0, 0.0, 0.0)
-    """Its centre of mass (3,) m, in its own axes."""
+
+    @property
+    def centroid(self) -> Vector:
+        """Its centre of mass (3,) m, in its own axes."""
+        return (0.0, 0.0, 0.0)
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments (3,) kg m^2."""
+        raise NotImplementedError
 
     def turned_inertia(self, mass: float, axes: np.ndarray) -> np.ndarray:
         """Inertia (3, 3) kg m^2 about its centre of mass, its own ``axes`` being the columns."""
@@ -71,7 +81,7 @@ class Part:
         (0.2, 0.2, 0.2)
     """
 
-    shape: Shape
+    shape: Shape | Hull
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Quaternion = IDENTITY
 
@@ -82,7 +92,7 @@ class Part:
             raise errors.WrongForm('shape', self.shape, 'one of ' + ', '.join((*SHAPES, 'hull')))
 
     @classmethod
-    def at(cls, shape: Shape, pose: Pose) -> Part:
+    def at(cls, shape: Shape | Hull, pose: Pose) -> Part:
         """A shape at a pose in the compound's axes."""
         x, y, z, w = map(float, pose.orientation)
         return cls(shape, vector(pose.position), (x, y, z, w))
@@ -103,15 +113,6 @@ class Part:
         if not any(self.shape.centroid):
             return np.array(self.position)
         return self.pose.apply(np.array(self.shape.centroid))
-
-    @property
-    def boxed(self) -> Part:
-        """Itself, or of a hull the box around it: for formats that have no hulls."""
-        if self.kind in SHAPES:
-            return self
-        lower, upper = self.shape.bounds
-        return Part.at(Box(vector(upper - lower)),
-                       self.pose.compose(Pose((lower + upper) / 2, np.array(IDENTITY))))
 
     @property
     def size(self) -> Vector:

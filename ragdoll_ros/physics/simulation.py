@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import os
 import warnings
@@ -13,6 +14,7 @@ import numpy as np
 
 from ..model import errors
 from ..model.biomechanical_limits import BiomechanicalLimits
+from ..model.compound import has_hull
 from ..model.coordinates import GeneralizedState, changed_coordinates, placed_coordinates
 from ..model.drive import Drive
 from ..model.mesh import Surface
@@ -1001,8 +1003,9 @@ def _needed(scene: Scene) -> Iterator[Capability]:
         yield Capability.FIXED_ROOTS
     if any(placement.motors for placement in scene.dolls):
         yield Capability.JOINT_SPRINGS
-    if any(isinstance(part.shape, Surface) for body in (*scene.bodies, *scene.bones)
-           for part in (body, *body.shape.parts)):
+    shapes = itertools.chain((body.shape for body in scene.bodies),
+                             (bone.shape for bone in scene.bones))
+    if any(isinstance(shape, Surface) or has_hull(shape) for shape in shapes):
         yield Capability.SURFACES
 
 
