@@ -6,7 +6,7 @@ import dataclasses
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
-from specimens import SPECIMENS
+from specimens import OCTAHEDRON, SPECIMENS
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ragdoll_ros.files.scene import load_scene
@@ -25,11 +25,14 @@ from ragdoll_ros.ros.messages.markers import SceneMarkers
 from ragdoll_ros.ros.ticker import PollThrottle
 
 
-@pytest.fixture(params=SPECIMENS)
+WITH_A_HULL = SPECIMENS | {'hull': OCTAHEDRON}
+
+
+@pytest.fixture(params=WITH_A_HULL)
 def lone(request):
     """A simulation of one bone of each shape, turned and away from the origin."""
     turn = tuple(rotation.from_rpy(0.3, -0.4, 0.5))
-    bone = Bone('bone', SPECIMENS[request.param], 2.0, (1.0, 2.0, 3.0), turn, color=(1, 0, 0, 1))
+    bone = Bone('bone', WITH_A_HULL[request.param], 2.0, (1.0, 2.0, 3.0), turn, color=(1, 0, 0, 1))
     with Simulation(Scene('lone', (Placement(Ragdoll('lone', (bone,))),))) as simulation:
         yield simulation
 
@@ -122,7 +125,10 @@ def _support(marker, directions):
     reach = {Marker.CUBE: lambda: np.abs(inner) @ half,
              Marker.SPHERE: lambda: np.linalg.norm(inner * half, axis=1),
              Marker.CYLINDER: lambda: np.abs(inner[:, 2]) * half[2]
-             + np.linalg.norm(inner[:, :2] * half[:2], axis=1)}[marker.type]()
+             + np.linalg.norm(inner[:, :2] * half[:2], axis=1),
+             Marker.TRIANGLE_LIST: lambda: (inner @ np.array(
+                 [[point.x * scale.x, point.y * scale.y, point.z * scale.z]
+                  for point in marker.points]).T).max(axis=1)}[marker.type]()
     return directions @ np.array([pose.position.x, pose.position.y, pose.position.z]) + reach
 
 

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('viser')
 import fit_rigs
 from fit_rigs import RIGS
-from specimens import SPECIMENS
+from specimens import OCTAHEDRON, SPECIMENS
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.fit.pipeline import fit_character
@@ -71,7 +71,7 @@ def test_a_mesh_is_closed_seen_from_outside_and_of_size_one(meshes, kind, volume
     assert there == {(b, a) for a, b in there}
 
 
-@pytest.mark.parametrize('shape', SPECIMENS.values(), ids=SPECIMENS)
+@pytest.mark.parametrize('shape', [*SPECIMENS.values(), OCTAHEDRON], ids=[*SPECIMENS, 'hull'])
 def test_what_is_drawn_of_a_bone_reaches_as_far_as_its_shape(shape):
     """Along any direction; flat faces of balls lack 1.7 % of a radius of 0.2 m."""
     import viser
@@ -83,7 +83,7 @@ def test_what_is_drawn_of_a_bone_reaches_as_far_as_its_shape(shape):
                   *np.zeros((2, 1, 3)))
     points = []
     for batch in Bodies(server, scene, state).batches:
-        vertices = MESHES[batch.kind][0]
+        vertices = batch.handle.vertices
         for place, wxyz, scale in zip(batch.handle.batched_positions, batch.handle.batched_wxyzs,
                                       batch.handle.batched_scales, strict=True):
             points.append(place + rotation.rotate(wxyz[[1, 2, 3, 0]], vertices * scale))
