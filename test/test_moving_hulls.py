@@ -33,6 +33,7 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.scene import Material
 from ragdoll_ros.model.shapes import Part
+from ragdoll_ros.physics.rigid_body import GroundHeights
 
 pytest.importorskip('numba')
 
@@ -98,6 +99,18 @@ def test_a_compound_of_hulls_is_that_of_their_boxes():
     np.testing.assert_allclose(hulls.inertia_matrix(2.0), boxes.inertia_matrix(2.0), rtol=1e-12)
     pose, same = hulls.principal_pose(), boxes.principal_pose()
     np.testing.assert_allclose(np.concatenate(pose), np.concatenate(same), atol=1e-12)
+
+
+def test_its_height_is_that_of_its_lowest_vertex():
+    """So that a tilted one above the ground does not count as one that begins within it."""
+    hull = Hull(*icosahedron())
+    stone = body('stone', hull, position=(0, 0, 1.91), orientation=TILTED)
+    vertices = rotation.rotate(TILTED, hull.vertices) + stone.position
+    made = world(stone)
+    with Simulation(made) as simulation:
+        heights = GroundHeights(made)(simulation.state)
+        assert heights[0] == pytest.approx(vertices[:, 2].min(), abs=1e-12)
+        assert heights[0] > 0 and not simulation.initial_overlaps
 
 
 @pytest.mark.parametrize('accuracy', ('draft', 'normal', 'exact'))

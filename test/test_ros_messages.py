@@ -24,7 +24,6 @@ from ragdoll_ros.ros.messages.interactive_markers import SCALE, InteractiveMarke
 from ragdoll_ros.ros.messages.markers import SceneMarkers
 from ragdoll_ros.ros.ticker import PollThrottle
 
-
 WITH_A_HULL = SPECIMENS | {'hull': OCTAHEDRON}
 
 

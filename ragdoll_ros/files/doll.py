@@ -154,7 +154,7 @@ def _shape(data: dict) -> Shape:
 
 def _part(data: dict, folder: Path) -> Part:
     kind, = {*SHAPES, Hull.kind} & data.keys()
-    shape = build_hull(data[kind], folder) if kind == Hull.kind else _shape({kind: data[kind]})
+    shape: Any = build_hull(data[kind], folder) if kind == Hull.kind else _shape({kind: data[kind]})
     return Part(shape, **{key: value for key, value in data.items() if key != kind})
 
 
@@ -214,7 +214,7 @@ def _passive_data(passive: Passive) -> dict:
             for key, end in (('lower', passive.lower), ('upper', passive.upper))}
 
 
-def _shape_data(shape: Shape | Hull) -> dict:
+def _shape_data(shape: Any) -> dict:
     if isinstance(shape, Hull):
         return {shape.kind: hull_data(shape)}
     return {shape.kind: {key: list(value) if isinstance(value, tuple) else value

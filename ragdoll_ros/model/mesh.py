@@ -273,9 +273,10 @@ class HeightField(Surface):
 
 def boxed(part: Part) -> Part:
     """A part, or in place of a hull the box around it: for formats that have no hulls."""
-    if not isinstance(part.shape, Hull):
+    shape: object = part.shape
+    if not isinstance(shape, Hull):
         return part
-    lower, upper = part.shape.bounds
+    lower, upper = shape.bounds
     return Part.at(Box(vector(upper - lower)),
                    part.pose.compose(Pose((lower + upper) / 2, np.array(IDENTITY))))
 

@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
 from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
-
-if TYPE_CHECKING:
-    from .mesh import Hull
 
 SEGMENTS = 20
 """Vertices of a circle in a mesh."""
@@ -81,7 +78,7 @@ class Part:
         (0.2, 0.2, 0.2)
     """
 
-    shape: Shape | Hull
+    shape: Shape
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Quaternion = IDENTITY
 
@@ -92,7 +89,7 @@ class Part:
             raise errors.WrongForm('shape', self.shape, 'one of ' + ', '.join((*SHAPES, 'hull')))
 
     @classmethod
-    def at(cls, shape: Shape | Hull, pose: Pose) -> Part:
+    def at(cls, shape: Shape, pose: Pose) -> Part:
         """A shape at a pose in the compound's axes."""
         x, y, z, w = map(float, pose.orientation)
         return cls(shape, vector(pose.position), (x, y, z, w))

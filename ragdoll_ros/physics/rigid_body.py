@@ -1,14 +1,18 @@
 """Kinematics of rigid bodies: points, heights above the ground, joint gaps, damping rates."""
 import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ..model import rotation
+from ..model.mesh import Hull
 from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll
+from ..model.rotation import IDENTITY
 from ..model.scene import Scene
-from ..model.shapes import support_distance
+from ..model.shapes import Part, support_distance
 from ..model.state import State
+from ..model.vectors import Quaternion
 
 
 def damping_rate(scene: Scene) -> float:
@@ -78,13 +82,21 @@ class GroundHeights:
 
 def _parts(doll: Ragdoll) -> tuple[np.ndarray, ...]:
     """Bone index (p,), arguments (p, 6) m of support_distance, position (p, 3) m and rotation
-    matrix (p, 3, 3) in the bone's frame, of each of a doll's p convex shapes.
+    matrix (p, 3, 3) in the bone's frame, of each of a doll's p convex shapes and vertices of hulls.
     """
-    parts = [(index, part) for index, bone in enumerate(doll.bones) for part in bone.shape.parts]
-    return (np.array([index for index, _ in parts]),
-            np.array([part.shape.support_terms for _, part in parts]),
-            np.array([part.position for _, part in parts]),
-            rotation.matrix([part.orientation for _, part in parts]))
+    parts = [(index, *row) for index, bone in enumerate(doll.bones) for part in bone.shape.parts
+             for row in _support_rows(part)]
+    bones, terms, positions, orientations = zip(*parts, strict=True)
+    return np.array(bones), np.array(terms), np.array(positions), rotation.matrix(orientations)
+
+
+def _support_rows(part: Part) -> Iterator[tuple[Sequence[float], Sequence[float], Quaternion]]:
+    """Terms of support_distance, position and orientation of a part; of a hull of each vertex."""
+    if isinstance(part.shape, Hull):
+        for vertex in part.pose.apply(part.shape.vertices):
+            yield (0.0,) * 6, vertex, IDENTITY
+    else:
+        yield part.shape.support_terms, part.position, part.orientation
 
 
 class JointGap:

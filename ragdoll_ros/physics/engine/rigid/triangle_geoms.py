@@ -72,8 +72,9 @@ def _by_faces(triangles: Triangles) -> tuple[np.ndarray, np.ndarray]:
     """An order (t,) of triangles in which those of a flat face follow each other, and how many
     each (t,) then is after the first of its face.
     """
+    centers = triangles.corners.mean(axis=1)
     planes = np.column_stack([triangles.normals, np.einsum(
-        'ti,ti->t', triangles.normals, triangles.corners[:, 0]) / np.ptp(triangles.corners)])
+        'ti,ti->t', triangles.normals, centers) / np.ptp(triangles.corners)])
     left, order, face = np.arange(len(planes)), [], []
     while len(left):
         same = np.abs(planes[left] - planes[left[0]]).max(axis=1) < ONE_PLANE
