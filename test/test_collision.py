@@ -49,7 +49,8 @@ def _way_to_gap(a, b, direction, wanted):
             return way
         x, y, z = a.position
         moved = Shape(a.kind, a.size, (x + way * direction[0], y + way * direction[1],
-                                       z + way * direction[2]), a.rotation, a.edges)
+                                       z + way * direction[2]), a.rotation, a.edges,
+                      a.is_of_hull)
         if separation(moved, b, math.inf) < wanted:
             near = way
         else:
