@@ -39,8 +39,8 @@ class LimitedAxis(NamedTuple):
     """``distance``, m: the largest separation of all. ``allowed``: of those that the edges allow,
     along ``axis`` and between a and the ``feature`` of the triangle; ``face``: along the
     ``normal``, which points to the side of a's center; ``edges``: of that side. ``beyond``: the
-    largest from edges and corners at which the surface bends. All are of a's core, without the
-    radius of a sphere or capsule.
+    largest from edges and corners at which the surface of a hull bends. All are of a's core,
+    without the radius of a sphere or capsule.
     """
 
     distance: float
@@ -114,8 +114,10 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
     distance = allowed = face
     axis, feature, beyond = normal, FACE, -math.inf
     for k in range(3):
-        found, bends = core_separation(a, corners, c, outward[k]), abs(edges[k]) > FLAT
-        distance, beyond = max(distance, found), max(beyond, found if bends else -math.inf)
+        found = core_separation(a, corners, c, outward[k])
+        distance, bends = max(distance, found), t.is_of_hull and abs(edges[k]) > FLAT
+        if bends and found > beyond:
+            beyond = found
         for turn in range(3):
             if a.kind == SPHERE and turn != 1:
                 continue
@@ -126,7 +128,9 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
             d = divide(d, length)
             d = neg(d) if dot(d, c) < 0 else d
             found = core_separation(a, corners, c, d)
-            distance, beyond = max(distance, found), max(beyond, found if bends else -math.inf)
+            distance = max(distance, found)
+            if bends and found > beyond:
+                beyond = found
             limited = allowed_at_edge(d, normal, outward[k], edges[k])
             found = core_separation(a, corners, c, limited)
             if found > allowed:
@@ -142,8 +146,10 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
         d = divide(d, length)
         d = neg(d) if dot(d, c) < 0 else d
         found, corner = core_separation(a, corners, c, d), supporting_corner(corners, d)
-        bends = abs(edges[corner]) > FLAT and abs(edges[(corner + 2) % 3]) > FLAT
-        distance, beyond = max(distance, found), max(beyond, found if bends else -math.inf)
+        distance = max(distance, found)
+        if t.is_of_hull and found > beyond and (
+                abs(edges[corner]) > FLAT and abs(edges[(corner + 2) % 3]) > FLAT):
+            beyond = found
         if found > allowed and is_allowed_from_a_side(d, normal, outward, edges, corner):
             allowed, axis, feature = found, d, FIRST_CORNER + corner
     return LimitedAxis(distance, allowed, axis, feature, face, normal, edges, beyond)
@@ -168,7 +174,7 @@ def triangle_separation(a: Shape, t: Shape) -> float:
     distance, gap = found.distance - radius, found.allowed - radius
     if is_beside(found, radius):
         return max(distance, -BARELY)
-    if t.is_of_hull and found.beyond > radius:
+    if found.beyond > radius:
         return max(distance, gap)
     if distance > gap:
         share = min(max(distance / REACH, 0.0), 1.0)
