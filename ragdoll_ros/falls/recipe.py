@@ -4,6 +4,7 @@ Its schema is config/recipe.schema.json.
 """
 import hashlib
 import json
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -96,9 +97,8 @@ class Recipe:
     @property
     def warnings(self) -> list[str]:
         """What its author may not have meant."""
-        return list(shifted_means({key: self.data[key] for key in DRAWN
-                                   if key in self.data and key != 'seed'
-                                   and not (key == 'who' and 'dolls' in self.data[key])}))
+        return list(shifted_means({key: part for key, part in self._drawn.items() if key != 'seed'
+                                   and not (key == 'who' and 'dolls' in part)}))
 
     @cached_property
     def digest(self) -> str:
@@ -108,7 +108,19 @@ class Recipe:
     @cached_property
     def philox_key(self) -> int:
         """Key of the random generator, 128 bits: a hash of the DRAWN keys."""
-        return int(_digest({key: self.data[key] for key in DRAWN if key in self.data})[:32], 16)
+        return int(_digest(self._drawn)[:32], 16)
+
+    @property
+    def stiffness(self) -> float:
+        """Of what is on the ground, N/m; infinity: nothing, or what is rigid."""
+        return self.data['ground'].get('stiffness', math.inf)
+
+    @property
+    def _drawn(self) -> dict:
+        """Data of the DRAWN keys, without the stiffness, which no motion depends on."""
+        ground = {key: value for key, value in self.data['ground'].items() if key != 'stiffness'}
+        return {key: ground if key == 'ground' else self.data[key]
+                for key in DRAWN if key in self.data}
 
     def doll(self, who: dict | int) -> Ragdoll:
         """The doll that falls; ``who`` is as returned by draw()."""
@@ -128,8 +140,8 @@ class Recipe:
         errors.check_range('fall', number, 0, 2 ** 63)
         philox = np.random.Philox(key=self.philox_key, counter=[0, 0, 0, number])
         generator = np.random.Generator(philox)
-        values = draw({key: self.data[key] for key in DRAWN
-                       if key in self.data and key not in ('seed', 'who')}, generator)
+        values = draw({key: part for key, part in self._drawn.items()
+                       if key not in ('seed', 'who')}, generator)
         groups = self.data['who'].get('people') or self.dolls
         chosen = min(int(generator.random() * len(groups)), len(groups) - 1)
         values['who'] = draw(groups[chosen], generator) if 'people' in self.data['who'] else chosen

@@ -100,7 +100,7 @@ def start_of(recipe: Recipe, number: int) -> Start:
         placement = replace(placement, angles=angles, rates=step.rates,
                             velocity=tuple(rotation.rotate(orientation, step.velocity)),
                             spin=tuple(rotation.rotate(orientation, step.spin)))
-    scene = Scene(recipe.name, (placement,), _ground(ground), gravity=GRAVITY,
+    scene = Scene(recipe.name, (placement,), _ground(ground, recipe.stiffness), gravity=GRAVITY,
                   material=Material(ground['friction'], restitution=ground['restitution']),
                   step=1 / recipe.rate, bodies=turned(recipe.bodies, heading))
     return Start(number, drawn, scene, start['clearance'], angles,
@@ -132,11 +132,11 @@ def _with_friction(doll: Ragdoll, ground: dict) -> Ragdoll:
         if bone.name in under else bone for bone in doll.bones))
 
 
-def _ground(drawn: dict) -> Ground:
+def _ground(drawn: dict, stiffness: float) -> Ground:
     """A plane whose normal is tilted downhill."""
     sine, cosine = sine_and_cosine(math.radians(drawn['slope_deg']))
     y, x = sine_and_cosine(math.radians(drawn['downhill_deg']))
-    return Ground((sine * x, sine * y, cosine))
+    return Ground((sine * x, sine * y, cosine), stiffness=stiffness)
 
 
 def _angles(doll: Ragdoll, start: dict) -> dict[str, float]:

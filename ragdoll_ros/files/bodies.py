@@ -3,6 +3,7 @@ driven ones, which follow what they are told.
 """
 import dataclasses
 import itertools
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -93,6 +94,7 @@ def body_data(body: StaticBody) -> dict:
     optional = {'orientation': None if body.orientation == IDENTITY else list(body.orientation),
                 'friction': body.friction, 'rolling_friction': body.rolling_friction,
                 'restitution': body.restitution,
+                'stiffness': body.stiffness if math.isfinite(body.stiffness) else None,
                 'color': None if body.color is None else list(body.color)}
     shape = surface_data if isinstance(body.shape, Surface | Plane) else shape_data
     return {'name': body.name, **shape(body.shape), 'position': list(body.position),
@@ -107,7 +109,7 @@ def _copies(first: Placed | None, entry: dict) -> list[Placed]:
 
 def _robot(entry: dict, folder: Path, where: str, found: list[ModelError]) -> PlacedRobot | None:
     """The robot of an entry with a file. Appends every error to ``found``."""
-    for key in ('mass', *MOTION):
+    for key in ('mass', 'stiffness', *MOTION):
         if key in entry:
             found.append(WrongForm(f'{where}.{key}', entry[key],
                                    'none: a robot never moves, or as it is told, by `follow`'))
@@ -137,6 +139,8 @@ def _static_body(entry: dict, folder: Path) -> StaticBody:
 def _loose_body(entry: dict, folder: Path) -> Placement:
     """A doll of one bone: a uniform solid, its frame that of the body's shape."""
     _check_options(entry)
+    if 'stiffness' in entry:
+        raise WrongForm('stiffness', entry['stiffness'], 'none: of bodies that never move only')
     kind = surface_kind(entry)
     if kind and kind != Hull.kind:
         key = 'mass' if 'mass' in entry else 'follow'

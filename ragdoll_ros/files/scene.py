@@ -169,6 +169,8 @@ def scene_data(scene: Scene, folder: Path | None = None,
         data['description'] = scene.description
     if scene.ground is not None:
         data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
+        if math.isfinite(scene.ground.stiffness):
+            data['ground']['stiffness'] = scene.ground.stiffness
     for placement in scene.dolls:
         entry = {'doll': dolls[placement.doll], 'name': placement.name}
         for key in ('position', 'orientation', 'velocity', 'spin'):

@@ -24,6 +24,7 @@ from .ragdoll import Bone, Ragdoll
 from .robot import Robot
 from .rotation import IDENTITY
 from .static_body import StaticBody
+from .surface import check_stiffness
 from .vectors import Quaternion, Vector, finite_floats, unit_vector
 
 SECOND = 1_000_000_000
@@ -78,11 +79,14 @@ class Material:
 
 @dataclass(frozen=True)
 class Ground:
-    """The half space below the plane normal . p = offset. Raises NotUnit, NotFinite, WrongForm.
+    """The half space below the plane normal . p = offset. Raises NotUnit, NotFinite, WrongForm,
+    NotPositive.
 
     Args:
         normal: (3,), out of the ground, world frame; normalised.
         offset: m, distance of the plane from the origin along the normal.
+        stiffness: N/m, of a mat on it, in series with the tissue in the contact law of impacts;
+            infinity: rigid. Motions do not depend on it.
 
     Example:
         >>> Ground(normal=(0, 0, 2)).normal
@@ -91,10 +95,12 @@ class Ground:
 
     normal: Vector = (0.0, 0.0, 1.0)
     offset: float = 0.0
+    stiffness: float = math.inf
 
     def __post_init__(self) -> None:
         set_fields(self, normal=unit_vector('normal', self.normal), offset=float(self.offset))
         errors.check_finite('offset', self.offset)
+        check_stiffness(self.stiffness)
 
 
 @dataclass(frozen=True)
@@ -465,6 +471,16 @@ class Scene:
         if bone >= 0:
             return self.bone_names[bone]
         return self.bodies[body].name if body >= 0 else 'ground'
+
+    def surface_stiffness(self, bone: int, body: int) -> float:
+        """Stiffness, N/m, of the surface that is touched, by indices as in touched_name(); of a
+        bone infinity: its tissue is of the contact law.
+        """
+        if bone >= 0:
+            return math.inf
+        if body >= 0:
+            return self.bodies[body].stiffness
+        return self.ground.stiffness if self.ground else math.inf
 
     def qualified(self, placement: Placement, name: str) -> str:
         """Name of a doll's bone or angle in the scene: prefixed where there are several dolls."""

@@ -1,4 +1,5 @@
 """StaticBody: what a scene has beside its dolls and the ground and never moves: a stair, a wall."""
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from .plane import Plane
 from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Part, Shape, Solid
-from .surface import check_surface
+from .surface import check_stiffness, check_surface
 from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
 
 DEFAULT_COLOR = (0.76, 0.78, 0.81, 1.0)
@@ -32,9 +33,10 @@ class StaticBody:
         rolling_friction: lever arm, m, 0 or more; None: that of the scene's material.
         restitution: 0 to 1; None: that of the scene's material.
         color: red, green, blue, opacity, 0 to 1; None: DEFAULT_COLOR.
+        stiffness: N/m, as of the Ground; infinity: rigid.
 
     Raises:
-        NotFinite, NotUnit, WrongForm, OutOfRange: for its fields.
+        NotFinite, NotUnit, NotPositive, WrongForm, OutOfRange: for its fields.
 
     Example:
         >>> StaticBody('wall', Box((0.1, 2, 2)), position=(1, 0, 1), friction=0.5).shape.kind
@@ -49,6 +51,7 @@ class StaticBody:
     rolling_friction: float | None = None
     restitution: float | None = None
     color: tuple[float, float, float, float] | None = None
+    stiffness: float = math.inf
 
     def __post_init__(self) -> None:
         set_fields(self, position=finite_floats('position', self.position),
@@ -58,6 +61,7 @@ class StaticBody:
             raise errors.WrongForm('shape', self.shape,
                                    'a shape, a Compound of shapes, a surface or a Plane')
         check_surface(self, max_rolling_friction=1e6)
+        check_stiffness(self.stiffness)
 
     @property
     def pose(self) -> Pose:

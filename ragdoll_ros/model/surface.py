@@ -1,9 +1,17 @@
-"""Checks of a surface: friction, restitution and color that a bone or a static body may have."""
+"""Checks of a surface: friction, restitution and color that a bone or a static body may have, and
+the stiffness of what is met.
+"""
 from typing import Any
 
 from . import errors
 from .errors import set_fields
 from .vectors import finite_floats
+
+
+def check_stiffness(stiffness: float) -> None:
+    """Raise NotPositive unless it is a number above zero, N/m; infinity is rigid."""
+    if not stiffness > 0:
+        raise errors.NotPositive('stiffness', stiffness, 'above zero, N/m; .inf is rigid')
 
 
 def check_surface(owner: Any, max_rolling_friction: float) -> None:

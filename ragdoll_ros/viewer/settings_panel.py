@@ -152,4 +152,4 @@ def sloping(ground: Ground, scene: Scene, slope: float) -> Ground:
     angle = math.radians(slope)
     normal = np.array((math.sin(angle) * math.cos(heading), math.sin(angle) * math.sin(heading),
                        math.cos(angle)))
-    return Ground(tuple(normal.tolist()), float(normal @ middle))
+    return dataclasses.replace(ground, normal=tuple(normal.tolist()), offset=float(normal @ middle))

@@ -22,14 +22,18 @@ from .impacts import Impact
 
 
 class PulseLaw:
-    """Durations of a scene's impacts, by the stiffness of the regions of ``limits``.
+    """Durations of a scene's impacts, by the stiffness of the regions of ``limits`` and of the
+    ground and bodies that have one.
 
     A bone without a region, as a foot, has that of the next bone towards the root that has one.
     """
 
     def __init__(self, scene: Scene, limits: BiomechanicalLimits) -> None:
         self._stiffness: dict[str, float] = {}
-        """N/m, by the bone's name in the scene."""
+        """N/m, by the name in the scene of what meets."""
+        surfaces = {scene.touched_name(-1, body): scene.surface_stiffness(-1, body)
+                    for body in range(-1, len(scene.bodies))}
+        self._stiffness |= {name: k for name, k in surfaces.items() if math.isfinite(k)}
         for placement, own in zip(scene.dolls, scene.bone_slices, strict=True):
             doll = placement.doll
             parents = {joint.child: joint.parent for joint in doll.joints}
@@ -41,8 +45,8 @@ class PulseLaw:
                     self._stiffness[name] = limits.regions[limits.region_of(at)].stiffness
 
     def duration(self, impact: Impact) -> float:
-        """Of an impact, s; 0 if no region takes part. Friction and other impacts beside it may take
-        its impulse out of mu v to 2 mu v.
+        """Of an impact, s; 0 if neither a region nor a stiffness takes part. Friction and other
+        impacts beside it may take its impulse out of mu v to 2 mu v.
         """
         springs = [self._stiffness[name] for name in (impact.bone, impact.against)
                    if name in self._stiffness]

@@ -3,9 +3,10 @@
 Bodies are rigid: an impact has a speed of approach v, an impulse and an effective mass mu, and no
 force. The contact law is a linear spring k of the body's region between them (ISO/TS 15066, annex
 A): the force is a half-sine of peak v sqrt(mu k) and duration pi sqrt(mu / k). Where both sides
-have a region, their springs are in series. The spring gives back what it takes: the impulse of its
-pulse is 2 mu v, that of the simulation (1 + e) mu v with a restitution e and without friction; the
-peak, which is at the end of the compression, does not depend on that.
+have a region, their springs are in series, and so is that of a ground or body with a stiffness. The
+spring gives back what it takes: the impulse of its pulse is 2 mu v, that of the simulation
+(1 + e) mu v with a restitution e and without friction; the peak, which is at the end of the
+compression, does not depend on that.
 """
 from __future__ import annotations
 
@@ -127,13 +128,14 @@ class ImpactRecorder:
     def _impact(self, found: Impacts, row: int, begin: int, bone: int, other: int,
                 sign: float) -> Impact:
         """The impact of ``bone`` in a row; ``sign``: 1 if it is a, -1 if it is b."""
-        scene, own = self._scene, self._region(bone)
+        scene, own, body = self._scene, self._region(bone), int(found.bodies[row])
         springs = [one.stiffness for one in (own, self._region(other)) if one]
+        springs.append(scene.surface_stiffness(other, body))
         stiffness = 1 / sum(1 / k for k in springs) if own else math.nan
         return Impact(
             begin + round(found.elapsed[row] * SECOND),
             scene.dolls[scene.doll_of_bone[bone]].name, scene.bone_names[bone],
-            self._regions[bone], scene.touched_name(other, int(found.bodies[row])),
+            self._regions[bone], scene.touched_name(other, body),
             _vector(found.positions[row]), _vector(sign * found.normals[row]),
             float(found.speeds[row]), float(found.effective_masses[row]),
             float(found.impulses[row]), float(found.mobilities[row, 0 if sign > 0 else 1]),
