@@ -15,7 +15,7 @@ from ragdoll_ros.model import errors
 from ragdoll_ros.model.anthropometry import MEN
 from ragdoll_ros.people.command import main
 from ragdoll_ros.people.joints import MEAN_MASS
-from ragdoll_ros.people.passive import GUARD_TORQUE
+from ragdoll_ros.people.passive import GUARD_TORQUE, end_widths
 from ragdoll_ros.people.person import person
 from ragdoll_ros.physics.simulation import Simulation
 
@@ -101,6 +101,23 @@ def test_the_command_writes_them_and_says_what_is_left_out(tmp_path, capsys):
     assert {name for name, (_, passive) in angles(load_doll(path)).items() if passive} == {
         name for name, (_, passive) in angles(person(1.7, 60, 'male', passive=True)).items()
         if passive}
+
+
+def test_trunks_stop_as_those_of_relaxed_living_people():
+    """Mean stiffness in successive quarters of the range of lateral bending, N m/degree, to the left
+    and right (Gombatto, in table 3 of Watt et al. 2022; of the last quarter to the left alone): it
+    grows e-fold in a quarter, to the 3 % in which an exponential fits four means with standard
+    deviations of half their size.
+    """
+    measured = (0.245, 0.625, 1.725, 5.19)
+    growth = np.polyfit(range(4), np.log(measured), 1)[0]
+    widths = end_widths(person(1.7, 70, 'male'))
+    for name, ends in (('r_waist', (17.5, 17.5)), ('r_chest', (17.5, 17.5)), ('waist', (12.5, 40))):
+        assert np.degrees(widths[name]) == pytest.approx(np.array(ends) / 4 / growth, rel=0.03)
+    assert end_widths(load_doll('doll')) == {}
+    simulated = end_widths(person(1.7, 70, 'male', passive=True))
+    assert simulated['r_waist'] == pytest.approx([1 / 20.36 / 2] * 2), 'of its own torques'
+    assert simulated['l_knee'] == widths['l_knee']
 
 
 def test_a_person_with_them_falls_and_keeps_the_account():

@@ -13,7 +13,7 @@ import math
 from dataclasses import replace
 
 from ..model.passive import Passive, PassiveEnd
-from ..model.ragdoll import Joint, Ragdoll
+from ..model.ragdoll import Joint, Limits, Ragdoll
 
 GUARD_TORQUE = 200.0
 """N m of the table's man. Where a passive torque reaches it, beyond what a joint bears, the hard
@@ -48,18 +48,33 @@ TORQUES = {
 
 
 ASSUMED_WIDTH = 0.09
-"""rad: of shoulders, elbows, wrists and neck, which the source has not: about its knee's and
-trunk's.
+"""rad: of shoulders, elbows, wrists and neck, which the source has not: about its knee's."""
+
+TRUNK_WIDTH = 1 / 4
+"""Of the range from upright, in which the torque of a relaxed living trunk grows e-fold. Measured
+in lateral bending: 0.25, 0.63, 1.7 and 5.2 N m/degree in successive quarters of the lumbar range;
+in flexion: 0.0, 0.1 and 0.7 N m per percent of it, as it becomes stiff (Gombatto and Beach, in
+tables 3 and 2 of Watt, Callaway and Williams 2022, Med Biol Eng Comput 60:2133).
 """
 
 
 def end_widths(doll: Ragdoll) -> dict[str, tuple[float, float]]:
-    """Widths in which the torques of a person's joint angles grow e-fold towards the lower and the
+    """Widths in which what stops a person's joint angles grows e-fold towards the lower and the
     upper end, rad, by the angle's name; none for a doll without any angle of the source.
     """
-    found = {name: _torque_of(name) for joint in doll.joints for name in joint.angle_names}
-    return {name: (torque.lower.width, torque.upper.width) if torque else (ASSUMED_WIDTH,) * 2
-            for name, torque in found.items()} if any(found.values()) else {}
+    angles = [(name, limits, bool(joint.passive)) for joint in doll.joints
+              for name, limits in zip(joint.angle_names, joint.angle_limits, strict=True)]
+    if not any(_torque_of(name) for name, _, _ in angles):
+        return {}
+    return {name: _widths(name, limits, passive) for name, limits, passive in angles}
+
+
+def _widths(name: str, limits: Limits | None, passive: bool) -> tuple[float, float]:
+    """Of one angle; ``passive``: its torques are simulated, and the limits guard them."""
+    if limits and not passive and name.endswith(('waist', 'chest')):
+        return TRUNK_WIDTH * -limits[0], TRUNK_WIDTH * limits[1]
+    torque = _torque_of(name)
+    return (torque.lower.width, torque.upper.width) if torque else (ASSUMED_WIDTH,) * 2
 
 
 def _torque_of(name: str) -> Passive | None:
