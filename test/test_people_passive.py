@@ -104,20 +104,47 @@ def test_the_command_writes_them_and_says_what_is_left_out(tmp_path, capsys):
 
 
 def test_trunks_stop_as_those_of_relaxed_living_people():
-    """Mean stiffness in successive quarters of the range of lateral bending, N m/degree, to the left
-    and right (Gombatto, in table 3 of Watt et al. 2022; of the last quarter to the left alone): it
-    grows e-fold in a quarter, to the 3 % in which an exponential fits four means with standard
-    deviations of half their size.
+    """Mean stiffness in successive quarters of the range of lateral bending, N m/degree, to the
+    left and right (Gombatto, in table 3 of Watt et al. 2022; of the last quarter to the left
+    alone): it grows e-fold in a quarter, to the 3 % in which an exponential fits four means with
+    standard deviations of half their size.
     """
     measured = (0.245, 0.625, 1.725, 5.19)
     growth = np.polyfit(range(4), np.log(measured), 1)[0]
     widths = end_widths(person(1.7, 70, 'male'))
-    for name, ends in (('r_waist', (17.5, 17.5)), ('r_chest', (17.5, 17.5)), ('waist', (12.5, 40))):
+    side = (17.5, 17.5)
+    for name, ends in (('r_waist', side), ('r_chest', side), ('waist', (12.5, 40))):
         assert np.degrees(widths[name]) == pytest.approx(np.array(ends) / 4 / growth, rel=0.03)
     assert end_widths(load_doll('doll')) == {}
     simulated = end_widths(person(1.7, 70, 'male', passive=True))
     assert simulated['r_waist'] == pytest.approx([1 / 20.36 / 2] * 2), 'of its own torques'
-    assert simulated['l_knee'] == widths['l_knee']
+    assert simulated['l_r_hip'] == widths['l_r_hip']
+
+
+def riener_edrich(joint, angle):
+    """N m towards a smaller angle at degrees, the other joints of the leg at 0, in the signs of the
+    package; Riener and Edrich 1999 have flexion of hip and knee, and plantarflexion, positive.
+    """
+    if joint == 'hip':
+        return -(math.exp(1.4655 + 0.0750 * angle) - math.exp(1.3403 - 0.0305 * angle) + 8.072)
+    if joint == 'knee':
+        return (math.exp(1.800 - 0.0352 * angle) - math.exp(-3.971 + 0.0495 * angle) - 4.820
+                + math.exp(2.220 - 0.150 * angle))
+    return math.exp(2.1016 - 0.0843 * angle) - math.exp(-7.9763 + 0.1949 * angle) - 1.792
+
+
+@pytest.mark.parametrize('joint', ['hip', 'knee', 'ankle'])
+@pytest.mark.parametrize('end', [0, 1])
+def test_legs_stop_as_those_of_relaxed_living_people(joint, end):
+    """Far beyond an end one term of the published curve is left, whose slope over its value is the
+    growth; 90 degrees beyond, others are less than 1 % of it.
+    """
+    width = math.degrees(end_widths(person(1.7, 70, 'male'))[
+        'l_knee' if joint == 'knee' else f'l_p_{joint}'][end])
+    at = (-1, 1)[end] * {'hip': 220, 'knee': 220, 'ankle': 140}[joint]
+    slope = (riener_edrich(joint, at + 0.5) - riener_edrich(joint, at - 0.5)) / riener_edrich(
+        joint, at)
+    assert 1 / abs(slope) == pytest.approx(width, rel=0.02)
 
 
 def test_a_person_with_them_falls_and_keeps_the_account():

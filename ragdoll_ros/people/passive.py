@@ -47,8 +47,17 @@ TORQUES = {
 """By the name of an angle without its side."""
 
 
+MEASURED_WIDTHS = {'p_hip': (1 / 0.0305, 1 / 0.0750), 'knee': (1 / 0.150, 1 / 0.0495),
+                   'p_ankle': (1 / 0.0843, 1 / 0.1949)}
+"""Degrees in which the torque of relaxed living legs grows e-fold towards the lower and the upper
+end (Riener and Edrich 1999, J Biomech 32:539; of the two terms that resist extension of the knee
+the steeper one), by the name of an angle without its side.
+"""
+
 ASSUMED_WIDTH = 0.09
-"""rad: of shoulders, elbows, wrists and neck, which the source has not: about its knee's."""
+"""rad: of shoulders, elbows, wrists and neck, which none of the sources has: about the first one's
+knee's.
+"""
 
 TRUNK_WIDTH = 1 / 4
 """Of the range from upright, in which the torque of a relaxed living trunk grows e-fold. Measured
@@ -73,6 +82,9 @@ def _widths(name: str, limits: Limits | None, passive: bool) -> tuple[float, flo
     """Of one angle; ``passive``: its torques are simulated, and the limits guard them."""
     if limits and not passive and name.endswith(('waist', 'chest')):
         return TRUNK_WIDTH * -limits[0], TRUNK_WIDTH * limits[1]
+    if name[2:] in MEASURED_WIDTHS and not passive:
+        lower, upper = MEASURED_WIDTHS[name[2:]]
+        return math.radians(lower), math.radians(upper)
     torque = _torque_of(name)
     return (torque.lower.width, torque.upper.width) if torque else (ASSUMED_WIDTH,) * 2
 
