@@ -37,7 +37,8 @@ SHARE_TOLERANCE = 0.1
 """Difference between two shares of falls above which they are told apart: twice the standard
 deviation of a share of 0.35 in a hundred falls."""
 
-WAIST_PEAK = KnownRange(3.8, 8.1, 'SisFall (10.3390/s17010198): medians of its 15 kinds of falls')
+WAIST_PEAK = KnownRange(3.8, 8.1, 'SisFall (10.3390/s17010198), '
+                        'onto landing mats: medians of its 15 kinds of falls')
 """g: largest acceleration of a sensor at the waist at 100 Hz, as docs/sisfall_peaks.py measures it
 in the 1798 falls of SisFall's files."""
 
