@@ -147,6 +147,31 @@ def test_all_that_is_entered_counts_however_long_a_change_takes(desk, typed, mas
     assert desk.bone('left_shin').restitution == (0.25 if typed[2][0] == 'restitution' else None)
 
 
+def test_the_value_of_before_may_be_typed_while_another_is_applied(desk):
+    begun, go_on, use = threading.Event(), threading.Event(), desk.use
+
+    def use_late(scene):
+        begun.set()
+        assert go_on.wait(60)
+        use(scene)
+
+    desk.editor.select('left_shin')
+    desk.use = use_late
+    mass = desk.panel.body['mass']
+    before = mass.value
+    mass.value = '7'
+    update = threading.Thread(target=desk.editor.update)
+    update.start()
+    assert begun.wait(60)
+    mass.value = before
+    go_on.set()
+    update.join(60)
+    assert desk.bone('left_shin').mass == 7
+    assert mass.value == before
+    desk.editor.update()
+    assert desk.bone('left_shin').mass == float(before)
+
+
 def test_a_faulty_value_is_refused_where_it_stands_and_stays(desk):
     desk.editor.select('left_shin')
     desk.panel.body['mass'].value = -3.0

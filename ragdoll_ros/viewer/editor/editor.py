@@ -220,7 +220,7 @@ class Editor:
         self._banner.on_action = self._on_action
         panel.limb.on_update(lambda _: self.show_handles())
         panel.snap.on_update(lambda _: self._set_snap(panel.snap.value))
-        panel.update.on_click(lambda _: self.update())
+        panel.update.on_click(lambda _: self._enter_form())
         panel.add.on_click(lambda _: self.add_bone(panel.name.value))
         panel.remove.on_click(lambda _: self.remove_limb())
         panel.add_static.on_click(lambda _: self.add_static(panel.static_name.value))
@@ -245,15 +245,19 @@ class Editor:
             self._in_order.submit(self.toggle)
 
     def _on_enter(self, field: str) -> None:
-        """Apply what the field's form has at this moment: it may be typed further meanwhile."""
+        """Apply the field's form, or add what it names."""
         if self.panel.has(field):
-            with self._display_lock:
-                self._waiting += 1
-                self._in_order.submit(self._apply_next, *self._typed())
+            self._enter_form()
         elif field == handle_id(self.panel.name):
             self._in_order.submit(self.add_bone, self.panel.name.value)
         elif field == handle_id(self.panel.static_name):
             self._in_order.submit(self.add_static, self.panel.static_name.value)
+
+    def _enter_form(self) -> None:
+        """Apply what the form has at this moment: it may be typed further meanwhile."""
+        with self._display_lock:
+            self._waiting += 1
+            self._in_order.submit(self._apply_next, *self._typed())
 
     def _typed(self) -> tuple[tuple[str, ...], FormValues, list[errors.ModelError]]:
         """The selected bones, the values of the form, and errors of those that cannot be read."""

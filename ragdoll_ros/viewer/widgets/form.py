@@ -82,7 +82,7 @@ class Form:
         self._filled: dict[str, tuple[str, FieldValue]] = {}
         """Text and exact value that a field was last filled with."""
         self._submitted: dict[str, tuple[str, FieldValue]] = {}
-        """Text and value that were last read from a field."""
+        """Text and value that were read from a field since it was filled."""
         self._changed: set[str] = set()
         """Keys of fields that have had another value since they were filled."""
         self.errors: dict[str, viser.GuiHtmlHandle] = {}
@@ -183,6 +183,7 @@ class Form:
 
     def _fill(self, key: str, widget: Any, value: FieldValue, keep_typed: bool) -> None:
         kind, stays = self._fields[key].widget, keep_typed and self._is_typed(key, widget, value)
+        self._submitted.pop(key, None)
         if kind == 'color':
             self._colors[key] = value
         text: Any = value
@@ -197,11 +198,14 @@ class Form:
             widget.value = text
 
     def _is_typed(self, key: str, widget: Any, value: FieldValue) -> bool:
-        """Whether the field has text that was typed since it was read, and ``value`` is not new."""
+        """Whether the field has text that was typed since it was read, and ``value`` is not new.
+
+        That text may be the one of before: who types 7 and, while that is applied, 5 again wants 5.
+        """
         known = [pair for pair in (self._filled.get(key), self._submitted.get(key)) if pair]
         return (self._fields[key].widget in TYPED
-                and all(widget.value != text for text, _ in known)
-                and any(value == known_value for _, known_value in known))
+                and any(value == known_value for _, known_value in known)
+                and widget.value != known[-1][0])
 
     def _read(self, key: str, given: Any) -> FieldValue:
         """Value of a widget's content; unchanged parts of a text keep their exact values."""
