@@ -133,6 +133,30 @@ def test_what_is_typed_while_a_value_is_applied_stays(view):
     view.wait(lambda: float(mass.input_value()) == SCENE.bones[SCENE.bone_index(BONE)].mass)
 
 
+AT_ONCE = """async ([update, file, name, save]) => {
+  update.click();
+  await null;
+  Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set.call(file, name);
+  file.dispatchEvent(new Event('input', {bubbles: true}));
+  await null;
+  save.click();
+}"""
+"""Presses Update, types a file's name and presses Save before the browser comes to any timer."""
+
+
+def test_nothing_is_lost_of_what_a_busy_browser_hears_at_once(view):
+    view.field('Mass, kg').fill('4.5')
+    name = f'edited_{next(NUMBERS)}'
+    update, file, save = (part.element_handle() for part in (
+        view.button('Update'), view.field('File'), view.button('Save')))
+    view.page.evaluate(AT_ONCE, [update, file, name, save])
+    view.see(f'saved {name}.yaml')
+    view.see(f'Undo: numbers of {BONE}')
+    assert changes.find(saved(view), BONE)[1].mass == 4.5
+    view.press(f'Undo: numbers of {BONE}')
+    view.button('Undo').wait_for()
+
+
 def banner(view):
     return view.page.locator('.ragdoll-edit-banner')
 

@@ -82,7 +82,8 @@ class Page:
                      hint(SIMULATION_HINT, 'ragdollHint') if is_simulated
                      else hint(RECORDING_HINT, 'ragdollRecordingHint'),
                      style('disconnected_banner.css', message=DISCONNECTED),
-                     script('null_node_guard.js'), script('materials.js'), script('look.js'),
+                     script('null_node_guard.js'), script('send_at_once.js'),
+                     script('materials.js'), script('look.js'),
                      script('quality.js'), script('hide_drag_arrow.js'),
                      script('handle_picking.js', ROOT=ROOT),
                      script('upload_notices.js'), script('decimal_comma.js')):
