@@ -67,6 +67,8 @@ class Guard:
     def _fault(self, state: State, before: State) -> str:
         """Why a state has diverged; empty if it has not."""
         swings = self._simulation.swings
+        if state is before and swings is None:
+            return ''
         for name, numbers in (('the state', state.rows),
                               ('a swing', None if swings is None else swings.positions)):
             # 'not <=' is true for NaN as well

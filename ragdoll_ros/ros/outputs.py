@@ -17,6 +17,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ..files.urdf import scene_to_urdf, urdf_tree
 from ..model.per_doll import PerDoll
 from ..model.scene import Scene
+from ..model.state import State
 from .humans.body import Body
 from .humans.publishers import Humans
 from .latched_topic import LATCHED, LATCHED_HISTORY, LatchedTopic, overridable_publisher
@@ -56,8 +57,11 @@ class Outputs:
         self._joints_move = ''
         """What joint_states would move, as they are on the topic that does."""
         self._measures = LatchedTopic(node, DiagnosticArray, '~/measures')
+        self._name = node.get_fully_qualified_name()
         self._run: tuple[Simulation | None, int, int] = (None, 0, 0)
         """The simulation that was published last, its reset_count, and the number of that run."""
+        self._energies: tuple[State | None, float, float, float] = (None, 0.0, 0.0, 0.0)
+        """A state of that run, its energy excess and the work of pushes and of grabs, J."""
         self._swings: LatchedTopic | None = None
         self._contacts = overridable_publisher(node, PoseArray, '~/contacts', 10)
         self._wrenches = overridable_publisher(node, MultiDOFJointState, '~/contact_wrenches', 10)
@@ -121,10 +125,10 @@ class Outputs:
     @property
     def has_subscribers(self) -> bool:
         """Whether a topic that is published with each tick has a subscriber."""
-        return (self._clock is not None or self._tf.has_subscribers
-                or self.humans.has_subscribers
+        return (self._clock is not None
                 or any(topic is not None and topic.has_subscribers
                        for topic in (self._measures, self._poses, self._swings))
+                or self._tf.has_subscribers or self.humans.has_subscribers
                 or self._joints_wanted or any(
                     topic.get_subscription_count()
                     for topic in (self._state, self._contacts, self._wrenches)))
@@ -190,10 +194,12 @@ class Outputs:
         if last is not simulation or reset_count != simulation.reset_count:
             run = time.time_ns()
             self._run = simulation, simulation.reset_count, run
-        measures = TickMeasures(simulation.time, run, self._urdf, simulation.energy_excess,
-                                *simulation.work)
-        self._measures.publish(serialize_measures(self._node.get_fully_qualified_name(), stamp,
-                                                  measures))
+            self._energies = (None, 0.0, 0.0, 0.0)
+        state = simulation.state
+        if state is not self._energies[0]:  # dolls that sleep keep theirs
+            self._energies = state, simulation.energy_excess, *simulation.work
+        self._measures.publish(serialize_measures(self._name, stamp, TickMeasures(
+            simulation.time, run, self._urdf, *self._energies[1:])))
 
     def _publish_swings(self, simulation: Simulation, stamp: int) -> None:
         self._swings.publish(self._templates.swings.serialize(stamp, poses_of(simulation.swings)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 from ...model.scene import SECOND
@@ -42,29 +42,27 @@ def checksum(description: str) -> str:
 def serialize_measures(name: str, stamp: int, measures: TickMeasures) -> bytes:
     """Serialized DiagnosticArray with one status of this ``name``; ``stamp`` in ns."""
     seconds, rest = divmod(measures.time, SECOND)
-    values = {TIME: f'{seconds}.{rest:09}', RUN: str(measures.run), URDF: measures.urdf,
-              EXCESS: f'{measures.energy_excess:.9g}',
-              WORK_OF_PUSHES: f'{measures.work_of_pushes:.9g}',
-              WORK_OF_GRABS: f'{measures.work_of_grabs:.9g}'}
-    return _array(name, stamp, values)
+    texts = (f'{seconds}.{rest:09}', str(measures.run), measures.urdf,
+             f'{measures.energy_excess:.9g}', f'{measures.work_of_pushes:.9g}',
+             f'{measures.work_of_grabs:.9g}')
+    return b''.join((CDR_HEADER, struct.pack('<iI', *divmod(stamp, SECOND)), _status(name),
+                     *(key + _padded(text) for key, text in zip(_KEYS, texts, strict=True))))
 
 
-def _array(name: str, stamp: int, values: Mapping[str, str]) -> bytes:
-    data = bytearray(struct.pack('<iI', *divmod(stamp, SECOND)))
-    _add_string(data, '')
-    data += bytes(-len(data) % 4) + struct.pack('<IB', 1, 0)
-    for text in (name, '', ''):
-        _add_string(data, text)
-    data += bytes(-len(data) % 4) + struct.pack('<I', len(values))
-    for pair in values.items():
-        for text in pair:
-            _add_string(data, text)
-    return CDR_HEADER + bytes(data)
+def _padded(text: str) -> bytes:
+    """A string up to the next multiple of four bytes, where it begins at one."""
+    content = text.encode()
+    return struct.pack('<I', len(content) + 1) + content + bytes(4 - len(content) % 4)
 
 
-def _add_string(data: bytearray, text: str) -> None:
-    content = text.encode() + b'\0'
-    data += bytes(-len(data) % 4) + struct.pack('<I', len(content)) + content
+_KEYS = tuple(map(_padded, (TIME, RUN, URDF, EXCESS, WORK_OF_PUSHES, WORK_OF_GRABS)))
+
+
+@lru_cache(1)
+def _status(name: str) -> bytes:
+    """All between stamp and values: the frame, one status of level 0, the number of values."""
+    return b''.join((_padded(''), struct.pack('<IB3x', 1, 0), _padded(name), _padded(''),
+                     _padded(''), struct.pack('<I', len(_KEYS))))
 
 
 def deserialize_measures(data: bytes) -> tuple[int, TickMeasures]:

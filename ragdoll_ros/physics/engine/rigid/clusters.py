@@ -341,7 +341,11 @@ class Clusters:
 
     def totals(self) -> dict[str, float]:
         """Statistics since the start, summed over clusters."""
-        return {name: self.stats[name].sum() + self.departed[name][0] for name in SUMMED_STATS}
+        return {name: self.total(name) for name in SUMMED_STATS}
+
+    def total(self, name: str) -> float:
+        """One of the `totals`."""
+        return self.stats[name].sum() + self.departed[name][0]
 
     def ledger(self) -> dict[str, int]:
         """What all steps since the start are made of; see LEDGER."""

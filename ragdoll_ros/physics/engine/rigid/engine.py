@@ -272,8 +272,8 @@ class RigidEngine:
 
     @property
     def work(self) -> tuple[float, float]:
-        totals = self._clusters.totals()
-        return float(totals['work_pushes']), float(totals['work_grabs'])
+        total = self._clusters.total
+        return float(total('work_pushes')), float(total('work_grabs'))
 
     def measures(self) -> dict[str, float]:
         stats = self._clusters.totals()
