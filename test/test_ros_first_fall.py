@@ -147,7 +147,7 @@ def test_the_strength_is_what_goes_out(view, heard):
     field = view.field('Strength, N')
     field.fill('350')
     field.press('Enter')
-    view.see('A tap gives 55 kg 0.16 m/s.')
+    view.see('A tap gives 55 kg 0.16 m/s in the air.')
     field.blur()  # else the keys would be the field's
     with pushed(view, heard) as result:
         view.key('ArrowDown')
