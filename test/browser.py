@@ -108,10 +108,11 @@ def skip_or_fail(reason):
 
 
 @contextmanager
-def chromium(draws=False):
+def chromium(draws=False, sharpness=SHARPNESS):
     """A browser with nothing in its profile, as Playwright's context; skips where there is none.
 
     ``draws``: whether somebody looks at the picture of the scene; else it stays empty.
+    ``sharpness``: pixels that are drawn to each of the mouse's.
     """
     try:
         from playwright.sync_api import sync_playwright
@@ -124,7 +125,7 @@ def chromium(draws=False):
             sync_playwright() as playwright:
         context = playwright.chromium.launch_persistent_context(
             profile, executable_path=path, headless=True, args=FLAGS, viewport=SIZE,
-            device_scale_factor=SHARPNESS)
+            device_scale_factor=sharpness)
         context.set_default_timeout(PATIENCE * 1000)
         if not draws:
             context.add_init_script(BLIND)

@@ -192,11 +192,14 @@ def one_doll():
 
 
 def many_dolls():
-    """Give the cost of a page with 50 dolls, 500 bones."""
+    """Give the cost of a page with 50 dolls, 500 bones; of three measurements that in which the page
+    kept up best, as others may use the machine meanwhile.
+    """
     with bench(50) as b:
         b.open_viewer()
         b.open_page()
-        return b.measure()
+        return max((b.measure() for _ in range(3)),
+                   key=lambda cost: cost.pages / min(60, cost.rate))
 
 
 def row(label: str, cost: Cost) -> str:
