@@ -192,8 +192,9 @@ def one_doll():
 
 
 def many_dolls():
-    """Give the cost of a page with 50 dolls, 500 bones; of three measurements that in which the page
-    kept up best, as others may use the machine meanwhile.
+    """Give the cost of a page with 50 dolls, 500 bones.
+
+    Of three measurements that in which the page kept up best: others may use the machine meanwhile.
     """
     with bench(50) as b:
         b.open_viewer()
