@@ -172,6 +172,15 @@ def test_the_value_of_before_may_be_typed_while_another_is_applied(desk):
     assert desk.bone('left_shin').mass == float(before)
 
 
+def test_a_change_is_current_though_the_page_draws_a_scene_from_elsewhere_first(desk):
+    """That was loaded just before the change, and is drawn after it."""
+    changed = changes.change_bone(DROP, 'head', mass=3.0)
+    desk.editor.set_scene(changed, 'mass')
+    desk.editor.show(load_scene('flight'))
+    desk.editor.show(changed)
+    assert desk.editor.scene == changed
+
+
 def test_a_faulty_value_is_refused_where_it_stands_and_stays(desk):
     desk.editor.select('left_shin')
     desk.panel.body['mass'].value = -3.0

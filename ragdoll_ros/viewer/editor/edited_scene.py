@@ -32,6 +32,8 @@ class EditedScene:
         self.lock = threading.RLock()
         self.history = UndoHistory(scene)
         self._pending: deque[Scene] = deque(maxlen=MAX_PENDING)
+        self._is_setting = False
+        """Whether a scene has been sent that is not current yet."""
 
     @property
     def current(self) -> Scene:
@@ -45,15 +47,22 @@ class EditedScene:
                 # Sent from here; the page draws late, and may have skipped some before it.
                 while self._pending.popleft() != scene:
                     pass
-            elif scene != self.current:
+                if self._pending or self._is_setting:
+                    return
+                # Where another one that was loaded was drawn in between, that is current now.
+            if scene != self.current:
                 is_same = (scene.name, scene.dolls) == (self.current.name, self.current.dolls)
                 self._push(scene, 'settings' if is_same else f'scene {scene.name}')
 
     def set(self, scene: Scene, name: str, pause: bool) -> None:
         """Make a scene current, as a change called ``name``; RagdollError if it is refused."""
-        self.restart(scene, pause)
-        with self.lock:
-            self._push(scene, name)
+        self._is_setting = True
+        try:
+            self.restart(scene, pause)
+            with self.lock:
+                self._push(scene, name)
+        finally:
+            self._is_setting = False
 
     def undo(self, pause: bool) -> None:
         """Go one step back."""
