@@ -108,11 +108,11 @@ def skip_or_fail(reason):
 
 
 @contextmanager
-def chromium(draws=False, sharpness=SHARPNESS):
+def chromium(draws=False, sharpness=None):
     """A browser with nothing in its profile, as Playwright's context; skips where there is none.
 
     ``draws``: whether somebody looks at the picture of the scene; else it stays empty.
-    ``sharpness``: pixels that are drawn to each of the mouse's.
+    ``sharpness``: pixels that are drawn to each of the mouse's, in place of SHARPNESS.
     """
     try:
         from playwright.sync_api import sync_playwright
@@ -125,7 +125,7 @@ def chromium(draws=False, sharpness=SHARPNESS):
             sync_playwright() as playwright:
         context = playwright.chromium.launch_persistent_context(
             profile, executable_path=path, headless=True, args=FLAGS, viewport=SIZE,
-            device_scale_factor=sharpness)
+            device_scale_factor=sharpness or SHARPNESS)
         context.set_default_timeout(PATIENCE * 1000)
         if not draws:
             context.add_init_script(BLIND)
