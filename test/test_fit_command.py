@@ -1,8 +1,10 @@
 """ragdoll_fit as a user calls it."""
 import dataclasses
+import re
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import fit_rigs
@@ -13,7 +15,9 @@ from fit_rigs import RIGS
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.fit.command import main
-from ragdoll_ros.model.scene import Placement
+from ragdoll_ros.fit.judging.fall_cost import FallCost, costs_report
+from ragdoll_ros.model.scene import Placement, above_ground, all_above_ground
+from ragdoll_ros.physics.simulation import Simulation
 
 BOTH = {'link0', 'link1', 'link1/1', 'link1/2'}
 """Links of two bones with a ball joint between them."""
@@ -38,6 +42,51 @@ def test_one_command_makes_a_scene_that_loads(tmp_path, capsys):
     assert f'model: {glb.name}' in out.read_text().splitlines()
     for words in ('thigh_l', 'vertices', 'mass, kg', '% of', 'shared', '20 bodies for 52 bones'):
         assert words in printed
+
+
+def test_the_report_states_what_a_fall_costs(tmp_path, capsys):
+    glb, out = fit_rigs.write(RIGS['unreal'], tmp_path), tmp_path / 'doll.yaml'
+    assert main([str(glb), '-o', str(out)]) == 0
+    line, = [line for line in capsys.readouterr().out.splitlines() if line.startswith('cost here')]
+    assert f'# {line}' in out.read_text().splitlines()
+    found = re.fullmatch(r'cost here, ms per tick of 10 ms, median: (\S+) at normal \(95 %: (\S+)\)'
+                         r', (\S+) at draft \(95 %: (\S+)\); (\d+) and (\d+) ticks', line)
+    medians, highest = map(float, found.group(1, 3)), map(float, found.group(2, 4))
+    for median, high, accuracy, said in zip(medians, highest, ('normal', 'draft'),
+                                            found.group(5, 6), strict=True):
+        assert 0 < median <= high
+        with Simulation(above_ground(load_doll(str(out))), accuracy=accuracy) as simulation:
+            costs = []
+            while len(costs) < 200 and not simulation.asleep:
+                begun = time.process_time()
+                simulation.advance()
+                costs.append(1e3 * (time.process_time() - begun))
+        # The first tick is left out; on a slow machine the fall ends early, after 0.4 s.
+        assert int(said) == len(costs) - 1 or int(said) * median > 10
+        # Two measurements, perhaps of a busy machine: the order of magnitude is the same.
+        assert 0.1 < median / np.median(costs) < 10
+
+
+def test_the_report_states_one_cost_of_several_dolls(tmp_path, capsys):
+    scene = tmp_path / 'two.yaml'
+    dolls = (load_doll('doll'), load_doll('man'))
+    save_scene(all_above_ground('two', [Placement(doll, position=(3 * index, 0, 0))
+                                        for index, doll in enumerate(dolls)]), scene)
+    assert main([str(scene)]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith('cost here') and printed.count('cost here') == 1
+    assert printed.count('verdict: ') == 2
+
+
+def test_a_slow_doll_is_told_what_touches_most():
+    contacts = Counter({('thigh', 'calf'): 30, ('calf', 'ground'): 10})
+    costs = [FallCost(accuracy, 0.01, np.full(20, ms), contacts)
+             for accuracy, ms in (('normal', 9.0), ('draft', 3.0))]
+    assert ' '.join(' '.join(costs_report(costs)).split()) == (
+        'cost here, ms per tick of 10 ms, median: 9 at normal (95 %: 9), 3 at draft (95 %: 3); '
+        "20 and 20 ticks slow: fewer bodies cost less, and so do pairs in the doll's no_collision; "
+        'most of its contacts are those of thigh and calf (75 %), calf and ground (25 %)')
+    assert len(costs_report(costs[1:])) == 1 and costs_report([]) == []
 
 
 def test_urdf_and_picture(glb, tmp_path, capsys):

@@ -10,7 +10,8 @@ from ..files.scene import load_scene, save_scene
 from ..files.urdf import to_urdf
 from ..model import errors
 from ..model.ragdoll import Ragdoll
-from ..model.scene import Placement, all_above_ground
+from ..model.scene import Placement, Scene, all_above_ground
+from .judging.fall_cost import costs_report, measure_costs
 from .judging.verdict import Verdict, judge
 from .pipeline import Fit, FitOptions, fit_characters
 from .reading.character import read_character
@@ -112,14 +113,17 @@ def _run(options: argparse.Namespace) -> list[Verdict]:
             for each, fit, text in made]
     verdicts = [judge(each.doll, fit, measured=path.suffix.lower() in ROBOT_SUFFIXES)
                 for each, fit, _ in made]
-    report = '\n\n'.join(f'{text}\n{verdict}'
+    scene = _scene(options, [placement for placement, _, _ in made])
+    cost = costs_report(measure_costs(scene))
+    report = '\n\n'.join('\n'.join([text, *(cost if len(made) == 1 else ()), str(verdict)])
                          for (_, _, text), verdict in zip(made, verdicts, strict=True))
+    if len(made) > 1:
+        report = '\n'.join([*cost, '', report]) if cost else report
     print(report)
     head = f'Fitted to {path.name}\n\n{report}'
     if options.output and len(made) == 1:
         save_doll(made[0][0].doll, options.output, head)
     elif options.output:
-        scene = all_above_ground(Path(options.output).stem, [placement for placement, _, _ in made])
         save_scene(scene, options.output, head)
     if options.output:
         load_scene(options.output)  # raises what whoever loads it would read
@@ -132,6 +136,13 @@ def _run(options: argparse.Namespace) -> list[Verdict]:
             from .picture import draw
             draw(placement.doll, fit.character if fit else None, _numbered(options.picture, ending))
     return verdicts
+
+
+def _scene(options: argparse.Namespace, placements: list[Placement]) -> Scene:
+    """The dolls above the ground; a scene of several that was read, as it is."""
+    if Path(options.input).suffix.lower() in DOLL_SUFFIXES and len(placements) > 1:
+        return load_scene(options.input)
+    return all_above_ground(Path(options.output or options.input).stem, placements)
 
 
 def _make_dolls(options: argparse.Namespace, path: Path) -> list[tuple[Placement, Fit | None, str]]:
