@@ -302,3 +302,26 @@ def test_what_is_wrong_is_named(tmp_path, body, said):
 def test_options_for_characters_are_refused(tmp_path, capsys):
     assert main([str(written(tmp_path, model())), '--mass', '3']) == 2
     assert 'a .sdf defines its own bodies' in capsys.readouterr().err
+
+
+def test_comments_may_have_what_gazebo_reads_and_xml_forbids(tmp_path):
+    path = tmp_path / 'arm.sdf'
+    path.write_text(f'<sdf version="1.7"><!-- gz topic --msgtype\n <link -- -->{model()}</sdf>')
+    (placement, _), = read_sdf(path)
+    assert placement.doll.root.name == 'base'
+    path.write_text('<!-- a --\n b -->\n<sdf><model></sdf>')
+    with pytest.raises(errors.ModelErrors, match='line 3'):
+        read_sdf(path)
+    path.write_text('<!DOC<!-- -->TYPE a><sdf/>')
+    with pytest.raises(errors.ModelErrors, match='DOCTYPE'):
+        read_sdf(path)
+
+
+def test_more_models_than_a_scene_may_have_are_refused_before_they_fall(tmp_path, capsys):
+    path = tmp_path / 'world.sdf'
+    models = ''.join(f'<model name="box{number}"><link name="l"><collision name="c"><geometry><box>'
+                     '<size>1 1 1</size></box></geometry></collision></link></model>'
+                     for number in range(1001))
+    path.write_text(f'<sdf version="1.7"><world name="w">{models}</world></sdf>')
+    assert main([str(path)]) == 2
+    assert 'OutOfRange: 1001; expected at most 1000 dolls in a file' in capsys.readouterr().err

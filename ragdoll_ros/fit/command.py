@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..files.doll import save_doll
-from ..files.scene import load_scene, save_scene
+from ..files.scene import MOST_DOLLS, load_scene, save_scene
 from ..files.urdf import to_urdf
 from ..model import errors
 from ..model.ragdoll import Ragdoll
@@ -109,6 +109,8 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> list[Verdict]:
     path = Path(options.input)
     made = _make_dolls(options, path)
+    if len(made) > MOST_DOLLS:
+        raise errors.OutOfRange(str(path), len(made), f'at most {MOST_DOLLS} dolls in a file')
     made = [(each, fit, '\n'.join([text, *captures_report(each.doll, options.animation)]))
             for each, fit, text in made]
     verdicts = [judge(each.doll, fit, measured=path.suffix.lower() in ROBOT_SUFFIXES)

@@ -14,6 +14,8 @@ LARGEST_TEXT = 32_000_000
 PREFIX = re.compile(r'<([A-Za-z_][\w.-]*):[A-Za-z_]|\s([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*\s*=')
 """The prefix of the name of an element, or of an attribute."""
 
+COMMENT = re.compile(r'<!--.*?-->', re.DOTALL)
+
 FIRST_TAG = re.compile(r'(<(?:robot|sdf)\b)')
 
 NAMES = {'robot': 'URDF', 'sdf': 'SDF'}
@@ -34,6 +36,8 @@ def parse_root(text: str, tag: str) -> ElementTree.Element:
     """Root element ``tag`` of a text. Raises Unreadable, WrongForm."""
     if len(text) > LARGEST_TEXT:
         raise errors.Unreadable('', f'{len(text)} characters', f'at most {LARGEST_TEXT}')
+    # Gazebo's worlds have -- in comments, which XML forbids and its parser allows.
+    text = COMMENT.sub(lambda comment: '\n' * comment[0].count('\n'), text)
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
         raise errors.Unreadable('', 'a DOCTYPE', f'{NAMES[tag]} without entities')
     try:

@@ -34,7 +34,7 @@ class FallCost:
     ticks: np.ndarray
     """ms of each tick (t,), without the first, which loads code."""
     contacts: Counter[tuple[str, str]]
-    """Contact points of each pair of bones at the ends of all ticks; 'ground' is named last."""
+    """Contact points of each pair at the ends of all ticks: a bone, and a bone or what stands."""
 
     def __str__(self) -> str:
         return (f'{np.median(self.ticks):.2g} at {self.accuracy} '
@@ -58,14 +58,15 @@ def _measure(scene: Scene, accuracy: str) -> FallCost:
     from ...physics.simulation import Simulation
     costs, pairs = [], Counter[tuple[str, str]]()
     with Simulation(scene, accuracy=accuracy) as simulation:
-        names = [bone.name for bone in scene.bones]
+        names = scene.bone_names
         for _ in range(round(DURATION / scene.step)):
             begun = time.process_time()
             simulation.advance()
             costs.append(1e3 * (time.process_time() - begun))
             contacts = simulation.contacts
-            pairs.update((names[a], 'ground') if b < 0 else (names[min(a, b)], names[max(a, b)])
-                         for a, b in zip(contacts.a.tolist(), contacts.b.tolist(), strict=True))
+            for a, b, body in zip(contacts.a, contacts.b, contacts.bodies, strict=True):
+                first, second = (a, b) if b < 0 else (min(a, b), max(a, b))
+                pairs[names[first], scene.touched_name(second, body)] += 1
             if simulation.asleep or sum(costs) > 1e3 * BUDGET:
                 break
     return FallCost(accuracy, scene.step, np.array(costs[1:] or costs), pairs)
