@@ -105,3 +105,23 @@ def apart(state, other):
             np.abs(state.linear_velocities
                    - other.linear_velocities).max(), np.abs(state.angular_velocities
                                                             - other.angular_velocities).max())
+
+
+FLAIL = """<model name="flail"><pose>4 5 6 0 0 1</pose>
+<link name="handle"><inertial><mass>2</mass></inertial><collision name="c"><geometry><box>
+  <size>0.1 0.1 1</size></box></geometry></collision></link>
+<link name="head"><pose>0 0 0.8 0 0 0</pose><inertial><mass>3</mass></inertial>
+  <collision name="c"><geometry><sphere><radius>0.2</radius></sphere></geometry></collision></link>
+<joint name="chain" type="ball"><parent>handle</parent><child>head</child>
+  <pose>0 0 -0.25 0 0 0</pose></joint>
+<plugin name="p" filename="p.so"><robotNamespace>flail</robotNamespace></plugin>
+</model>"""
+
+FLAIL_SDF = f"""<?xml version="1.0"?>
+<sdf version="1.9"><world name="yard">
+<model name="ground_plane"><static>true</static><link name="plane"><collision name="c"><geometry>
+  <plane><normal>0 0 1</normal></plane></geometry></collision></link></model>
+{FLAIL}</world></sdf>"""
+"""A handle of 2 kg, a head of 3 kg, and a ground, which no doll is."""
+
+TWO_FLAILS_SDF = FLAIL_SDF.replace('</world>', FLAIL.replace('"flail"', '"other"') + '</world>')

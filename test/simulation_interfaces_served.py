@@ -19,6 +19,7 @@ from geometry_msgs.msg import PoseArray, Vector3
 from peer import start
 from rclpy.action import ActionClient
 from rclpy.parameter import Parameter
+from samples import FLAIL_SDF, TWO_FLAILS_SDF
 from simulation_interfaces import action, msg, srv
 from std_srvs.srv import SetBool, Trigger
 
@@ -515,7 +516,7 @@ def test_a_reset_takes_away_what_was_spawned(node, call):
 
 @pytest.mark.parametrize(('fields', 'wrong'), [
     ({'name': 'a/b'}, 102), ({'name': 'step_1'}, 101), ({'entity_namespace': 'ns'}, 105),
-    ({**spawned('')}, 104), ({**spawned('world.sdf')}, 103), ({**spawned('nowhere')}, 2),
+    ({**spawned('')}, 104), ({**spawned('scene.mjcf')}, 103), ({**spawned('nowhere')}, 2),
     ({**spawned('', 'dolls: []')}, 106), ({**spawned('crowd')}, 108),
     ({'initial_pose': {'header': {'frame_id': 'map'}}}, 109),
     ({'initial_pose': {'pose': {'position': {'x': math.nan}}}}, 109),
@@ -552,6 +553,30 @@ def test_spawnables_are_the_dolls_and_can_be_spawned(node, call):
         assert code(response) == 1, response
         state = call('GetEntityState', entity=response.entity_name).state
         assert row(state)[:3] == pytest.approx([-20, len(uri) / 2, 2])
+
+
+def test_a_robot_in_sdf_is_spawned_and_falls(node, call, tmp_path):
+    path = tmp_path / 'flail.sdf'
+    path.write_text(FLAIL_SDF)
+    assert 'sdf' in call('GetSimulatorFeatures').features.spawn_formats
+    listed = call('GetSpawnables', sources=[tmp_path.as_uri()]).spawnables[-1]
+    assert getattr(listed, 'entity_resource', listed).uri == path.as_uri()
+    for y, name, given in ((-5.0, 'by_uri', spawned(path.as_uri())),
+                           (5.0, 'by_text', spawned('', FLAIL_SDF))):
+        response = call('SpawnEntity', name=name, **given, initial_pose={
+            'pose': {'position': {'x': -20.0, 'y': y, 'z': 3.0}}})
+        assert code(response) == 1 and response.entity_name == name, response
+        assert 'ground_plane' in response.result.error_message
+        assert row(call('GetEntityState', entity=name).state)[:3] == pytest.approx([-20, y, 3])
+        assert node.simulation.scene.dolls[-1].doll.mass == pytest.approx(5)
+    call('StepSimulation', steps=20)
+    scene, fallen = node.simulation.scene, 9.8 / 2 * (20 * node.simulation.step) ** 2
+    for name in ('by_uri', 'by_text'):
+        bones = [scene.bone_index(f'{name}/{bone}') for bone in ('handle', 'head')]
+        # In the air both fall as a stone does, whatever holds them together.
+        np.testing.assert_allclose(node.simulation.state.positions[bones, 2],
+                                   [3 - fallen, 3.8 - fallen], atol=1e-6)
+    assert code(call('SpawnEntity', name='two', **spawned('', TWO_FLAILS_SDF))) == 108
 
 
 def test_several_are_spawned_and_those_that_cannot_be_are_named(node, call):

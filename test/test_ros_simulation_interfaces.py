@@ -15,7 +15,7 @@ import pytest
 import yaml
 from conftest import ROOT
 from message_packages import build
-from samples import random_coordinates
+from samples import FLAIL_SDF, TWO_FLAILS_SDF, random_coordinates
 from simulation_interfaces_types import VERSION_1, VERSION_2
 
 from ragdoll_ros.files.doll import load_doll
@@ -187,21 +187,43 @@ def test_a_robot_and_a_character_are_what_the_fit_makes_of_them():
     assert character.model == str(ROOT / 'config/character.glb')
 
 
+def test_a_robot_in_sdf_is_its_links_and_joints(tmp_path):
+    path = tmp_path / 'flail.sdf'
+    path.write_text(FLAIL_SDF)
+    for found in (doll_of('', FLAIL_SDF), doll_of(path.as_uri(), ''),
+                  doll_of(str(path), 'ignored')):
+        doll = found.placement.doll
+        assert [(bone.name, bone.mass) for bone in doll.bones] == [('handle', 2), ('head', 3)]
+        joint, = doll.joints
+        assert joint.kind == 'ball'
+        assert np.subtract(joint.anchor, doll.root.position) == pytest.approx([0, 0, 0.55])
+        assert any('ground_plane' in note and 'static' in note for note in found.notes)
+        placed = at_root_pose(found.placement, Pose(np.array([1.0, 2, 3]), rotation.IDENTITY))
+        with Simulation(Scene('one', (placed,))) as simulation:
+            np.testing.assert_allclose(simulation.state.positions, [[1, 2, 3], [1, 2, 3.8]],
+                                       atol=1e-12)
+    with pytest.raises(Refusal, match='2 robots; expected of one') as refused:
+        doll_of('', TWO_FLAILS_SDF)
+    assert refused.value.code == 108
+
+
 def test_spawnables_are_the_dolls_in_config_and_what_folders_hold(tmp_path):
     assert {each.uri for each in shipped()} == {
         'article_doll', 'character', 'doll', 'man', 'walker', 'woman'}
     heights = {each.uri: np.ptp(each.box, axis=0)[2] for each in shipped()}
     assert 1.5 < heights['woman'] < heights['man'] < 1.9
-    for name in ('a robot.urdf', 'b.GLB', 'notes.txt'):
+    for name in ('a robot.urdf', 'b.GLB', 'c.sdf', 'notes.txt'):
         tmp_path.joinpath(name).write_text('')
     found, message = spawnables([tmp_path.as_uri(), str(tmp_path / 'nothing'), 'model://x'])
     assert [each.uri for each in found[len(shipped()):]] == [
-        (tmp_path / name).as_uri() for name in ('a robot.urdf', 'b.GLB')]
+        (tmp_path / name).as_uri() for name in ('a robot.urdf', 'b.GLB', 'c.sdf')]
     assert str(tmp_path / 'nothing')[:50] in message and 'model://x' in message
 
 
 @pytest.mark.parametrize(('uri', 'text', 'code'), [
-    ('', ' ', 104), ('nowhere', '', 2), ('world.sdf', '', 103), ('', '<sdf/>', 103),
+    ('', ' ', 104), ('nowhere', '', 2), ('scene.mjcf', '', 103), ('', '<mujoco/>', 103),
+    ('nowhere.sdf', '', 2), ('', '<sdf/>', 106), ('', '<sdf name="hunter2"', 106),
+    ('SECRET.sdf', '', 106),
     ('nowhere.urdf', '', 2), ('', '<robot/>', 106), ('', '<robot name="hunter2"', 106),
     ('SECRET.urdf', '', 106), ('SECRET.glb', '', 106), ('SECRET.gltf', '', 106),
     ('crowd', '', 108), ('', 'password: hunter2', 106), ('', 'dolls: [{doll: nobody}]', 106),

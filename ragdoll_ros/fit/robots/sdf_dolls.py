@@ -34,7 +34,14 @@ def read_sdf(path: str | Path) -> list[tuple[Placement, tuple[str, ...]]]:
         raise errors.ModelErrors(str(path), [error]) from None
 
 
-def _read(tree: UrdfTree, folder: Path) -> list[tuple[Placement, tuple[str, ...]]]:
+def dolls_from_sdf(text: str) -> list[tuple[Placement, tuple[str, ...]]]:
+    """Dolls of the text of an SDF, as read_sdf() without a folder for meshes; raises a ModelError
+    with the fault.
+    """
+    return _read(parse_sdf(text), None)
+
+
+def _read(tree: UrdfTree, folder: Path | None) -> list[tuple[Placement, tuple[str, ...]]]:
     made: list[tuple[Placement, tuple[str, ...]]] = []
     poses, others, static = tree.poses(tree.initial_angles), [], []
     refused: list[errors.ModelError] = []

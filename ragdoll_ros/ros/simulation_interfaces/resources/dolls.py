@@ -1,7 +1,8 @@
-"""Dolls that are spawned: of our YAML, of a robot's URDF, or fitted to a rigged character."""
+"""Dolls that are spawned: of our YAML, a robot's URDF or SDF, or fitted to a rigged character."""
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -18,12 +19,14 @@ from .worlds import scene_of
 UNSUPPORTED_FORMAT, NO_RESOURCE, RESOURCE_PARSE_ERROR, UNSUPPORTED_ASSETS = 103, 104, 106, 108
 """Results of SpawnEntity."""
 
-URDF = ('.urdf',)
+URDF, SDF = ('.urdf',), ('.sdf',)
 CHARACTERS = ('.glb', '.gltf', '.vrm')
 """Ends of the names of files."""
 
-SPAWN_FORMATS = ('yaml', 'urdf', 'gltf')
+SPAWN_FORMATS = ('yaml', 'urdf', 'sdf', 'gltf')
 
+ROOT = re.compile(r'<(robot|sdf)\b')
+"""The first tag of a URDF or an SDF; plugins of an SDF have a <robotNamespace>."""
 
 MOST_KEPT = 16
 """Files in config/ whose dolls are kept."""
@@ -37,8 +40,9 @@ class Found(NamedTuple):
 
 
 def doll_of(uri: str, text: str) -> Found:
-    """The doll of a resource: of a scene of one doll or a doll, a URDF, or a character. A scene's
-    ground and bodies are left out. Raises Refusal; says nothing of a file that is none of these.
+    """The doll of a resource: of a scene of one doll or a doll, a URDF, an SDF of one robot, or a
+    character. A scene's ground and bodies are left out. Raises Refusal; says nothing of a file that
+    is none of these.
     """
     try:
         return _of_file(uri) if uri else _of_text(text)
@@ -49,11 +53,12 @@ def doll_of(uri: str, text: str) -> Found:
 
 
 def _of_file(uri: str) -> Found:
-    name = scene_of(uri, '', UNSUPPORTED_FORMAT, (*YAML, *URDF, *CHARACTERS))
-    read: Callable[[Path], Found] | None = _robot if name.lower().endswith(URDF) else (
-        _character if name.lower().endswith(CHARACTERS) else None)
-    if read is not None:
-        return read(find(name))
+    name = scene_of(uri, '', UNSUPPORTED_FORMAT, (*YAML, *URDF, *SDF, *CHARACTERS))
+    readers: dict[tuple[str, ...], Callable[[Path], Found]] = {
+        URDF: _robot, SDF: _robot_of_sdf, CHARACTERS: _character}
+    for ends, read in readers.items():
+        if name.lower().endswith(ends):
+            return read(find(name))
     path = find(name)
     if path.parent == config_folder():
         return _one(_shipped(str(path), path.stat().st_mtime_ns))
@@ -71,13 +76,17 @@ def _shipped(path: str, _: int) -> tuple[Placement, ...]:
 def _of_text(text: str) -> Found:
     if not text.strip():
         raise Refusal(NO_RESOURCE, 'uri and resource_string are empty; expected a name in config/, '
-                      'a path, YAML or URDF')
+                      'a path, YAML, URDF or SDF')
     if not text.lstrip().startswith('<'):
         return _one(scene_from_data(yaml_text.parse(text.encode()), Path('/resource_string')).dolls)
-    if '<robot' not in text:
-        raise Refusal(UNSUPPORTED_FORMAT, 'resource_string: XML without <robot; expected a URDF, '
-                      'or a scene or doll as YAML')
+    root = ROOT.search(text)
+    if root is None:
+        raise Refusal(UNSUPPORTED_FORMAT, 'resource_string: XML without <robot and <sdf; expected '
+                      'a URDF or an SDF, or a scene or doll as YAML')
     # Imported here: no node needs the fit that spawns none of these.
+    if root[1] == 'sdf':
+        from ....fit.robots.sdf_dolls import dolls_from_sdf
+        return _one_robot(dolls_from_sdf(text))
     from ....fit.robots.robot import doll_from_urdf
     return Found(Placement(doll_from_urdf(text)))
 
@@ -85,10 +94,28 @@ def _of_text(text: str) -> Found:
 def _robot(path: Path) -> Found:
     """The doll of a URDF: the robot with its motors off."""
     from ....fit.robots.robot import read_urdf
-    if '<robot' not in path.read_text(encoding='utf-8', errors='replace'):
-        raise Refusal(RESOURCE_PARSE_ERROR, f'{path}: a file without <robot; expected a URDF')
+    _check_root(path, 'robot', 'URDF')
     doll, notes = read_urdf(path)
     return Found(Placement(doll), notes)
+
+
+def _robot_of_sdf(path: Path) -> Found:
+    """The doll of an SDF of one robot."""
+    from ....fit.robots.sdf_dolls import read_sdf
+    _check_root(path, 'sdf', 'SDF')
+    return _one_robot(read_sdf(path))
+
+
+def _one_robot(robots: list[tuple[Placement, tuple[str, ...]]]) -> Found:
+    if len(robots) > 1:
+        raise Refusal(UNSUPPORTED_ASSETS, f'an SDF of {len(robots)} robots; expected of one')
+    return Found(*robots[0])
+
+
+def _check_root(path: Path, tag: str, name: str) -> None:
+    """Raise Refusal for a file without ``tag``, of which nothing else is to be told."""
+    if f'<{tag}' not in path.read_text(encoding='utf-8', errors='replace'):
+        raise Refusal(RESOURCE_PARSE_ERROR, f'{path}: a file without <{tag}; expected {name}')
 
 
 def _character(path: Path) -> Found:

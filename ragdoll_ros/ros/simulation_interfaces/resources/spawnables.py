@@ -12,7 +12,7 @@ import numpy as np
 from ....files.config import doll_names
 from ....files.doll import load_doll
 from ..bounds import bounding_box
-from .dolls import CHARACTERS, URDF
+from .dolls import CHARACTERS, SDF, URDF
 
 MOST_FILES = 1000
 """Files of a folder that are listed."""
@@ -57,7 +57,7 @@ def spawnables(sources: Iterable[str]) -> tuple[list[Spawnable], str]:
 def _files(folder: Path) -> Iterator[Spawnable]:
     """Robots and characters in a folder. Raises OSError."""
     paths = sorted(path for path in folder.iterdir()
-                   if path.suffix.lower() in (*URDF, *CHARACTERS))
+                   if path.suffix.lower() in (*URDF, *SDF, *CHARACTERS))
     for path in paths[:MOST_FILES]:
-        what = 'robot' if path.suffix.lower() in URDF else 'character'
+        what = 'robot' if path.suffix.lower() in (*URDF, *SDF) else 'character'
         yield Spawnable(path.absolute().as_uri(), f'{what} in {path.name}')
