@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 from browser import SHARPNESS, View, chromium, opened, serving
 from conftest import ROOT
+from samples import FLAIL_SDF
 from test_fit_broken import BROKEN
 
 from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.fit.robots.sdf_dolls import read_sdf
+from ragdoll_ros.model.scene import all_above_ground
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.mcap_file import load_recording, recording_bytes
 from ragdoll_ros.recordings.recording import Recording
@@ -502,3 +505,25 @@ def test_rubbish_is_refused_and_a_character_is_fitted(view):
     view.wait(lambda: view.page.evaluate(
         'Object.keys(window.__viserMutable.nodeRefFromName).some('
         'name => /^.scene.skins.[0-9]+$/.test(name))'))
+
+
+def test_a_robot_in_sdf_is_uploaded_and_falls(view, tmp_path):
+    """The handle stands 0.4 m above the ground, the head over it; both are drawn as they fall."""
+    path = tmp_path / 'flail.sdf'
+    path.write_text(FLAIL_SDF)
+    scene = all_above_ground('flail', [placement for placement, _ in read_sdf(path)])
+    view.tab('Edit')
+    upload(view, 'Fit a character', 'flail.sdf', FLAIL_SDF.encode())
+    view.see('fitted flail.sdf: 2 bones')
+    view.see('verdict: ')
+    view.wait(lambda: np.isfinite(view.bodies(scene)).all())
+    view.wait(lambda: view.bodies(scene)[1][2] < 0.5)
+    view.hold_at(scene, np.array([[4, 5, 0.9], [4, 5, 1.7]]))
+
+
+def test_an_sdf_in_which_nothing_moves_says_so(view):
+    still = FLAIL_SDF.replace('<model name="flail">', '<model name="flail"><static>1</static>')
+    view.tab('Edit')
+    upload(view, 'Fit a character', 'still.sdf', still.encode())
+    view.see('still.sdf: 1 error')
+    view.see('expected a model that moves')
