@@ -1,13 +1,16 @@
 """Write docs/robots.md: the results of `ragdoll_fit` for every URDF of some packages.
 
 python docs/robots.py pybullet_data=FOLDER example-robot-data=FOLDER ... > docs/robots.md
+python docs/robots.py --summary docs/robots.md
 
-Standard error names the fastest body of each robot that is still awake, and its speed.
+Standard error names the fastest body of each robot that is still awake, and its speed. The summary
+of the packages is the table in docs/fit.md.
 """
 from __future__ import annotations
 
 import contextlib
 import itertools
+import re
 import subprocess
 import sys
 import time
@@ -43,7 +46,10 @@ LOADS = 'import pybullet as p, sys; p.connect(p.DIRECT); p.loadURDF(sys.argv[1])
 
 
 def main(arguments: list[str]) -> None:
-    """Write the table to standard output."""
+    """Write the table, or the summary of one, to standard output."""
+    if arguments[:1] == ['--summary']:
+        print(summary(Path(arguments[1]).read_text(encoding='utf-8')))
+        return
     print(HEAD)
     for argument in arguments:
         name, _, folder = argument.partition('=')
@@ -109,6 +115,31 @@ def fall(doll: Ragdoll) -> str:
             return f'{10 * spent:.2f} | {asleep}'
     except RagdollError as error:
         return f'does not run: {error} |'
+
+
+def summary(page: str) -> str:
+    """A row for each package of a page: counts, ranges, costs, verdicts, and how many sleep."""
+    found = ['| package | URDFs | fitted | bodies | kg | ms per tick: median, largest '
+             '| verdict: good, doubtful | asleep within 10 s |',
+             '| --- | --- | --- | --- | --- | --- | --- | --- |']
+    for section in page.split('\n## ')[1:]:
+        rows = [[cell.strip() for cell in line.strip('|').split('|')]
+                for line in section.splitlines() if line.startswith('| ')][2:]
+        many = [tuple(map(int, re.match(r'(\d+) of (\d+) files', row[0]).groups()))
+                for row in rows if ' files like ' in row[0]]
+        fell = [row for row in rows if row[6]]
+        ends = [[float(end) for row in rows if row[column] for end in row[column].split(' to ')]
+                for column in (2, 3)]
+        costs = [float(row[6]) for row in fell]
+        files = len(rows) + sum(count - 1 for _, count in many)
+        fitted = len(fell) + sum(count for count, _ in many)
+        bodies, masses = (f'{min(each):.4g} to {max(each):.4g}' for each in ends)
+        words = [sum(row[5] == word for row in fell) for word in ('good', 'doubtful')]
+        asleep = sum(row[7] != 'no' for row in fell)
+        found.append(f'| {section.splitlines()[0]} | {files} | {fitted} | {bodies} | {masses} '
+                     f'| {np.median(costs):.2f}, {max(costs):.1f} | {words[0]}, {words[1]} '
+                     f'| {asleep} of {len(fell)} |')
+    return '\n'.join(found)
 
 
 if __name__ == '__main__':

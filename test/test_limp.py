@@ -12,7 +12,17 @@ import pytest
 from conftest import ROOT
 from test_animations import MOVES, G, analytic, momenta, momenta_of_poses, twin
 
-from ragdoll_ros import Bone, Placement, Push, Ragdoll, Scene, Simulation, Sphere, load_doll
+from ragdoll_ros import (
+    Bone,
+    Placement,
+    Push,
+    Ragdoll,
+    Scene,
+    Simulation,
+    Sphere,
+    load_doll,
+    load_limits,
+)
 from ragdoll_ros.files.animation import load_animations
 from ragdoll_ros.files.doll import save_doll
 from ragdoll_ros.files.run_scene import read_run_scene, run_scene_text
@@ -273,6 +283,30 @@ def test_what_it_meets_is_hit_and_does_not_disturb_it(doll, animations):
     # A wall at u gives a ball (1 + e) u, loses (1 - e^2) m u^2 / 2: with e = 1/2 a quarter of its
     # work. The chest turns, too.
     assert -excess / work == pytest.approx(0.25, abs=0.02)
+
+
+def test_its_contacts_are_those_with_what_yields(doll, animations):
+    """A ball is hit with its own mass; the ground under the feet bears nothing."""
+    start = animations['run'].play(Placement(doll), limp_at=2)
+    chest = next(bone for bone in doll.bones if 'Spine' in bone.name)
+    scene = Scene('air', (start, ball((1.5, 0.0, float(chest.position[2])), mass=2.0)),
+                  Ground(offset=0.3), gravity=(0, 0, 0))
+    impacts, touched = [], set()
+    with Simulation(scene) as simulation:
+        simulation.record_impacts(load_limits())
+        for _ in range(75):
+            simulation.advance()
+            impacts += simulation.impacts
+            touched |= {*simulation.contacts.a.tolist(), *simulation.contacts.b.tolist()}
+        impulses, velocity = simulation.contact_impulses, simulation.state.linear_velocities[-1]
+    assert {impact.doll for impact in impacts} == {'ball', start.name}
+    for impact in impacts:
+        assert impact.effective_mass == pytest.approx(2, abs=1e-9)
+        assert impact.impulse == pytest.approx((1 + 0.5) * 2 * impact.speed, rel=1e-9)
+    assert -1 not in touched
+    # Newton's third law, and the momentum of the ball.
+    np.testing.assert_allclose(impulses[-1], 2 * velocity, atol=1e-9)
+    np.testing.assert_allclose(impulses[:-1].sum(axis=0), -impulses[-1], atol=1e-9)
 
 
 def test_a_falling_doll_lies_on_one_that_walks_and_both_fall(doll, animations):
