@@ -8,6 +8,7 @@ import io
 import json
 import os
 import re
+import runpy
 import shlex
 import tempfile
 from pathlib import Path
@@ -206,6 +207,11 @@ def test_falls_page_names_every_key_and_every_format():
     data = json.loads((ROOT / 'config/recipe.schema.json').read_text())
     assert keys(data) <= named, keys(data) - named
     assert coded(table('docs/falls.md', 'Formats')) >= set(FORMATS)
+
+
+def test_the_table_of_packages_is_the_summary_of_their_robots():
+    summary = runpy.run_path(str(ROOT / 'docs/robots.py'))['summary']
+    assert summary(PAGES['docs/robots.md']) in PAGES['docs/fit.md']
 
 
 def test_measures_are_told_one_by_one():
