@@ -211,12 +211,12 @@ def test_momentum_is_kept_in_the_air_while_others_lie_on_the_ground(engine):
 def overlapping(count, seed, height, velocity):
     """So many loose boxes of random sizes, masses and poses, one within the other, no ground."""
     draw = np.random.default_rng(seed)
-    boxes = []
+    boxes, up = [], np.array((0.0, 0.0, 1.0))
     for number in range(count):
         q = draw.normal(size=4)
         shape, mass = Box(tuple(draw.uniform(0.1, 0.25, 3))), draw.uniform(1, 8)
         box = Ragdoll(f'box_{number}', (Bone('box', shape, mass, (0.0, 0.0, 0.0)),))
-        boxes.append(Placement(box, position=draw.uniform(-0.15, 0.15, 3) + (0, 0, height),
+        boxes.append(Placement(box, position=height * up + draw.uniform(-0.15, 0.15, 3),
                                orientation=tuple(q / np.linalg.norm(q)), velocity=velocity,
                                name=f'box_{number}'))
     return dataclasses.replace(load_scene('drop'), dolls=tuple(boxes), ground=None)
