@@ -46,14 +46,13 @@ it was last halved, and the chords since."""
 
 STEP_SCALARS = np.dtype([
     ('start_contact_count', np.int64), ('start_point_count', np.int64), ('tried_count', np.int64),
-    ('tried_dt', float), ('tracks_points', np.int64), ('seeks_impacts', np.int64),
-    ('correction_energy', float), ('start_load_potential', float), ('residual', float),
-    ('solve_error', float)], align=True)
+    ('tracks_points', np.int64), ('seeks_impacts', np.int64), ('correction_energy', float),
+    ('start_load_potential', float), ('residual', float), ('solve_error', float)], align=True)
 """Of a contact step: contacts at its start, points that have gaps of their own then, and contacts
-in its last trial, and that one's length, s; whether points have gaps now; whether it ends at
-impacts; potential energy that position correction adds, J; load_potential() at its start, J; the
-largest residual velocity of its large islands, m/s, and the share of the velocities that is
-allowed, see physics/accuracy.py."""
+in its last trial if that was as long; whether points have gaps now; whether it ends at impacts;
+potential energy that position correction adds, J; load_potential() at its start, J; the largest
+residual velocity of its large islands, m/s, and the share of the velocities that is allowed, see
+physics/accuracy.py."""
 
 GAP_COUNTS = np.dtype([('fixed', np.int64), ('live', np.int64)], align=True)
 """Gaps of ground points, limits and pairs; these and those of contacts.points."""

@@ -114,12 +114,11 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             continue
         if not seek and turn < MAX_TRIES - 1 and activate_contacts(s, ws, length):
             ledger.new_contacts += 1
-            keep_tried(ws, m, length)
+            keep_tried(ws, m)
             continue
         overshot, landed, fast = impacts_at_end(s, ws, length)
         hit = seek and fast
         if seek and turn < MAX_TRIES - 1 and update_bracket(s, ws, length, overshot, landed):
-            keep_tried(ws, m, length)
             length = next_trial_step(s, ws, cluster.v)
             ledger.past_impact += 1
             continue
@@ -228,13 +227,13 @@ def activate_contacts(s: System, ws: Workspace, h: float) -> bool:
 
 
 @compiled
-def keep_tried(ws: Workspace, m: int, h: float) -> None:
-    """Keep the m contacts of a trial of h s, to begin the next one with their impulses: where it
-    has the same length, islands without a new contact are solved already.
+def keep_tried(ws: Workspace, m: int) -> None:
+    """Keep the m contacts of a trial, to begin the next one of the same length with their
+    impulses: islands without a new contact are solved already.
     """
     for i in range(m):
         ws.contacts.tried[i] = ws.contacts.found[i]
-    ws.step.scalars[0].tried_count, ws.step.scalars[0].tried_dt = m, h
+    ws.step.scalars[0].tried_count = m
 
 
 @compiled

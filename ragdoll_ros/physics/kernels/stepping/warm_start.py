@@ -40,7 +40,6 @@ def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) ->
     """
     stats, pressed = ws.stats[0], 0.0
     tried_count = ws.step.scalars[0].tried_count
-    tried_share = h / ws.step.scalars[0].tried_dt if tried_count else 0.0
     share = h / stats.last_dt if stats.last_dt > 0 else 0.0
     for j in range(stats.contact_count):
         pressed += abs(known[j].impulse[0])
@@ -61,7 +60,7 @@ def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) ->
         t = find_id(ws.contacts.tried, tried_count, c.id, t)
         if t < tried_count:
             for e in range(5):
-                c.impulse[e] = tried_share * ws.contacts.tried[t].impulse[e]
+                c.impulse[e] = ws.contacts.tried[t].impulse[e]
         k = find_id(ws.contacts.start, start_count, c.id, k)
         c.persistent = 1 if k < start_count and not (
             is_new and is_approaching(ws.contacts.start[k])) else 0

@@ -10,6 +10,7 @@ from ....model.drive import Drive
 from ....model.push import Push
 from ....model.scene import Scene
 from ....model.vectors import Vector
+from ....ros.inputs.input_counts import InputCounts
 from ....ros.messages.convert import to_vector
 
 
@@ -34,8 +35,11 @@ class ForcePublisher:
             self._timer.cancel()
 
 
-class NoInputCounts:
+class NoInputCounts(InputCounts):
     """Input counts for ros/inputs that count nothing: the node itself reports them."""
+
+    def __init__(self) -> None:
+        """Need no logger."""
 
     def refuse(self, source: str, reason: object) -> None:
         """Do nothing."""
