@@ -2,6 +2,8 @@
 from __future__ import annotations
 
 import ast
+import asyncio
+import collections
 import json
 import re
 from importlib.metadata import version
@@ -104,3 +106,31 @@ def test_a_script_is_html_whose_attribute_is_the_script():
                               ('&amp;', '&')):
         code = code.replace(entity, character)
     assert code == 'const KEY = "a \\"b\\" <c> & \'d\'";\n' + scripts.source('hint.js')
+
+
+class Changing(collections.deque):
+    """Waiters of which one comes or goes while they are gone through, the first two times."""
+
+    left = 2
+
+    def __iter__(self):
+        found = super().__iter__()
+        yield next(found)
+        if self.left:
+            self.left -= 1
+            raise RuntimeError('deque mutated during iteration')
+        yield from found
+
+
+def test_a_message_from_another_thread_wakes_all_that_wait(server):
+    """Viser tells of messages by an event that it sets outside of its loop's thread."""
+    async def woken():
+        event = viser_internals.ThreadSafeEvent()
+        waiters = [asyncio.ensure_future(event.wait()) for _ in range(3)]
+        await asyncio.sleep(0)
+        event._waiters = Changing(event._waiters)
+        await asyncio.get_running_loop().run_in_executor(None, event.set)
+        return await asyncio.wait_for(asyncio.gather(*waiters), 60)
+    assert asyncio.run(woken()) == [True] * 3
+    event = server._websock_server.get_message_buffer().message_event
+    assert isinstance(event, viser_internals.ThreadSafeEvent)

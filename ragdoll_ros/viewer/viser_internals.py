@@ -5,6 +5,7 @@ pass with the new version: it checks that each name below exists there.
 """
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 import viser
 from viser import _messages
+from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 VERSIONS = '>=1.1.1,<1.2'
 
@@ -23,6 +25,34 @@ CLIENT_NAMES = ('__viserMutable', 'sendMessage', 'scene', 'nodeRefFromName', 'ca
 CLIENT_PACKAGES = {'@mantine/core': '^9.', '@mantine/notifications': '^9.',
                    '@react-three/fiber': '^9.', 'three': '^0.'}
 """Libraries of the client on whose class names, event filter or objects browser/* relies."""
+
+
+_make_buffer = AsyncMessageBuffer.__init__
+
+
+class ThreadSafeEvent(asyncio.Event):
+    """An event that any thread sets, as viser does with that of a new message: asyncio's raises
+    RuntimeError where a waiter comes or goes meanwhile, which ended the viewer.
+    """
+
+    def set(self) -> None:
+        """Wake all waiters."""
+        while True:
+            try:
+                super().set()
+                return
+            except RuntimeError as error:
+                if 'mutated' not in str(error):
+                    raise
+                self._value = False  # or the next turn would wake nobody
+
+
+def _make_safe_buffer(buffer: AsyncMessageBuffer, *args: Any, **options: Any) -> None:
+    _make_buffer(buffer, *args, **options)
+    buffer.message_event = ThreadSafeEvent()
+
+
+AsyncMessageBuffer.__init__ = _make_safe_buffer  # type: ignore[method-assign]
 
 
 def handle_id(handle: viser.GuiInputHandle) -> str:
