@@ -12,11 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from . import errors, rotation
-from .compound import has_hull
 from .errors import set_fields
 from .follow import Follow
 from .forward_kinematics import BoneMotion, bone_motions
-from .mesh import Surface
 from .motors import Motors
 from .playback import Playback
 from .pose import Pose
@@ -346,33 +344,6 @@ class Scene:
                     raise errors.DuplicateName(f'{key}[{index}].name', one.name, 'a unique name')
                 names.add(one.name)
         self._check_robots()
-        self._check_hulls()
-
-    def _check_hulls(self) -> None:
-        """Raise WrongForm where hulls could meet what they pass through: hulls and surfaces."""
-        hulls = [index for index, placement in enumerate(self.dolls) if placement.doll.hulls]
-        yielding = [index for index in hulls if not (
-            self.dolls[index].follow and self.dolls[index].is_kinematic)]
-        if not yielding:
-            return
-        first = yielding[0]
-        where, name = f'dolls[{first}].doll', self.dolls[first].name
-        for body in self.bodies:
-            if isinstance(body.shape, Surface) or has_hull(body.shape):
-                raise errors.WrongForm(where, f'{name}, which has a hull', (
-                    f'other shapes beside the surface of {body.name}: hulls that are moved by '
-                    'forces pass through meshes, height fields and hulls'))
-        for other in hulls:
-            if other != first:
-                raise errors.WrongForm(where, f'{name}, which has a hull', (
-                    f'other shapes beside the hull of {self.dolls[other].name}: of two hulls one '
-                    'does not collide with the other'))
-        for index in yielding:
-            doll = self.dolls[index].doll
-            for pair in itertools.combinations(doll.hulls, 2):
-                if self.self_collision and frozenset(pair) not in doll.excluded_pairs:
-                    raise errors.WrongForm(f'dolls[{index}].doll.no_collision', list(pair), (
-                        'the pair in it: of two hulls one does not collide with the other'))
 
     def _check_robots(self) -> None:
         follow = {placement.name for placement in self.dolls if placement.is_kinematic}

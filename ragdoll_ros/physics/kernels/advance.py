@@ -57,7 +57,7 @@ from .stepping.contact_step import approaches_fast, begin_contact_step
 from .stepping.impact import follow_twist, impact
 from .stepping.momentum import sum_dolls
 from .stepping.step_control import step_to_impact
-from .system import SYSTEM, System
+from .system import System, system_at
 from .workspace import WORKSPACE, Workspace
 
 LONGEST_FLIGHT = 0.05
@@ -76,8 +76,7 @@ MAX_IMPACTS, IMPACT_WORK, MIN_IMPACTS = 200, 2_000_000, 8
 that many bodies do not cost their cube; none where they would be fewer than the least number. From
 then on what meets within a step is a contact of it, with restitution."""
 
-system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
-                                             bundle_at(CLUSTER_STATE))
+workspace_at, cluster_state_at = bundle_at(WORKSPACE), bundle_at(CLUSTER_STATE)
 
 
 @compiled

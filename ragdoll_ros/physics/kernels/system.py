@@ -5,35 +5,40 @@ import collections
 
 import numpy as np
 
-from .compiling.bundle import bundle_type
+from .compiling.bundle import bundle_at, bundle_type
 from .dynamics.body import BODY
 
 GEOM = np.dtype([
     ('body', np.int64), ('kind', np.int64), ('size', float, 3), ('position', float, 3),
     ('orientation', float, 4), ('bounding_radius', float), ('reach', float), ('friction', float),
     ('rolling_friction', float), ('restitution', float), ('first_point', np.int64),
-    ('point_count', np.int64), ('edges', float, 3), ('triangles', np.int64), ('face', np.int64),
-    ('first_vertex', np.int64)], align=True)
+    ('point_count', np.int64), ('edges', float, 3), ('hull', np.int64)], align=True)
 """A convex shape of a body, or of the WORLD. ``kind`` and ``size``: see collision/shapes.py.
 ``position``, m, and ``orientation``: of the shape's center and axes from the body's center of mass,
 along the doll's axes in the bind pose; of static ones in the world. ``bounding_radius``: of the
 sphere around it; ``reach``: from the body's center of mass to its farthest point, m. ``friction``,
 ``rolling_friction`` (m) and ``restitution``: against the ground. ``first_point``, ``point_count``:
 its own among all points that may touch the ground. ``edges``: of a triangle, see
-collision/triangles/triangle.py.
-
-A hull that moves is a geom of the kind HULL, whose ``point_count`` vertices begin at
-``first_vertex`` of System.vertices, and the ``triangles`` of its surface, the geoms that follow
-it. Those of a flat face follow each other; ``face``: how many geoms a triangle is after the first
-of its face."""
+collision/triangles/triangle.py. ``hull``: index of a hull in System.hulls."""
 
 GEOM_PAIR = np.dtype([
     ('a', np.int64), ('b', np.int64), ('friction', float), ('rolling_friction', float),
     ('restitution', float), ('point', np.int64)], align=True)
 """Two geoms that may collide, and the parameters of their contact; a static one is ``b``. With a
 plane there is a pair for each ``point`` of ``a`` that may touch it, one after the other, as each
-has a gap of its own; see ground_point() of contact/gaps.py. Of a geom and a hull the pair with the
-HULL, which never touches, comes first, then those with its triangles."""
+has a gap of its own; see ground_point() of contact/gaps.py."""
+
+HULL_TABLE = np.dtype([
+    ('first_vertex', np.int64), ('vertex_count', np.int64), ('first_face', np.int64),
+    ('face_count', np.int64), ('triangle_count', np.int64), ('size', float)], align=True)
+"""A convex hull: where its vertices are in System.vertices, m, in its geom's frame, whose origin is
+its centroid; where its triangles are in System.hull_faces, first one of each face, then those that
+lie in the planes of these; and its radius about the origin, m."""
+
+HULL_FACE = np.dtype([('normal', float, 3), ('offset', float), ('corners', np.int64, 3)],
+                     align=True)
+"""A triangle of a hull: unit normal n, outwards, and offset d, m, of its plane n x = d, equal for
+all triangles of a flat face; its corners, anticlockwise, counted from the hull's first vertex."""
 
 JOINT_LIMIT = np.dtype([('q', np.int64), ('dof', np.int64), ('lower', float), ('upper', float)],
                        align=True)
@@ -50,7 +55,7 @@ along it, m, negative if the shapes overlap; an id that points of the same featu
 System = collections.namedtuple(
     'System', 'tree gravity dof_parent dof_body dof_damping body_last_dof body_root body_doll '
     'geoms pairs joint_limits ground_normal ground_offset restitution_speed doll_masses '
-    'energy_scale flight_enabled vertices')
+    'energy_scale flight_enabled vertices hull_faces hulls')
 """A scene of n bodies, nv degrees of freedom and d dolls. ``tree`` (n,): the kinematic trees, see
 dynamics/body.py. ``gravity`` (3,) m/s^2. ``dof_parent`` (nv,): the next degree of freedom towards
 the root, -1 at its end; ``dof_body`` (nv,); ``dof_damping`` (nv,) N m s/rad. ``body_last_dof``
@@ -59,8 +64,8 @@ root; ``body_doll`` (n,). ``geoms``, static ones last; ``pairs`` (of geoms that 
 ``joint_limits``. ``ground_normal`` (3,), ``ground_offset`` (1,) m, -inf: no ground.
 ``restitution_speed`` (1,) m/s: slower impacts do not bounce. ``doll_masses`` (d,) kg.
 ``energy_scale`` (1,) J: m g L of the whole system, L the largest reach. ``flight_enabled`` (1,):
-whether joint damping allows explicit integration. ``vertices`` (k, 3) m of hulls that move, in
-their geoms' frames."""
+whether joint damping allows explicit integration. ``vertices`` (k, 3) m, ``hull_faces`` and
+``hulls``: the convex hulls."""
 
 OVERLAPPING, JOINT_OUTSIDE_LIMITS, KINEMATIC = 1, 2, 4
 """Flags, why a pair is excluded from collision for now: its geoms overlap, as they did at the
@@ -110,7 +115,11 @@ def blank_system() -> System:
         body_doll=np.zeros(1, np.int64), geoms=np.zeros(1, GEOM), pairs=np.zeros(1, GEOM_PAIR),
         joint_limits=np.zeros(1, JOINT_LIMIT), ground_normal=np.zeros(3), ground_offset=np.zeros(1),
         restitution_speed=np.zeros(1), doll_masses=np.zeros(1), energy_scale=np.zeros(1),
-        flight_enabled=np.zeros(1), vertices=np.zeros((0, 3)))
+        flight_enabled=np.zeros(1), vertices=np.zeros((0, 3)), hull_faces=np.zeros(0, HULL_FACE),
+        hulls=np.zeros(0, HULL_TABLE))
 
 
 SYSTEM = bundle_type(blank_system())
+
+system_at = bundle_at(SYSTEM)
+"""The System at an address, in compiled code."""

@@ -17,7 +17,7 @@ from ...kernels.collision.shapes import SHAPE_KIND
 from ...kernels.dynamics.body import BODY, FIXED, MOVED
 from ...kernels.system import (GEOM, GEOM_PAIR, JOINT_LIMIT, NO_SLIP, System, coordinate_count)
 from ...rigid_body import damping_rate
-from .triangle_geoms import geom_count, hull_geoms, is_of_hull
+from .hull_tables import NO_HULLS, HullTables, hull_geom, hull_tables, join_hulls
 
 MAX_FLIGHT_DAMPING = 1000.0
 """1/s: largest decay rate of joint damping that is integrated explicitly, in flight; above, contact
@@ -36,10 +36,10 @@ def build_system(scene: Scene) -> System:
     limits = np.zeros(len(layout.limited[0]), JOINT_LIMIT)
     limits['q'], limits['dof'] = layout.limited
     limits['lower'], limits['upper'] = layout.limits
-    geoms, vertices = _geoms(scene, tree)
+    geoms, hulls = _geoms(scene, tree)
     return System(
         tree=tree, gravity=np.array(scene.gravity, float), **_dofs(tree, layout.sizes[1]),
-        geoms=geoms, vertices=vertices,
+        geoms=geoms, **hulls._asdict(),
         pairs=make_pairs(_within_dolls(scene, geoms), contact_laws(scene)),
         joint_limits=limits,
         ground_normal=np.array(ground.normal if ground else (0.0, 0.0, 1.0)),
@@ -103,10 +103,12 @@ def energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) 
     return np.array([tree['mass'][falls].sum() * reach * math.hypot(*gravity)])
 
 
-def join_systems(systems: Sequence[System], pairs: np.ndarray,
-                 static_geoms: np.ndarray) -> System:
-    """Concatenate systems and ``static_geoms``, GEOM, and add ``pairs`` (p,), GEOM_PAIR."""
-    q = v = bodies = dolls = geoms = points = vertices = 0
+def join_systems(systems: Sequence[System], pairs: np.ndarray, static_geoms: np.ndarray,
+                 static_hulls: HullTables) -> System:
+    """Concatenate systems and ``static_geoms``, GEOM, with their hulls, and add ``pairs`` (p,),
+    GEOM_PAIR.
+    """
+    q = v = bodies = dolls = geoms = points = hulls = 0
     parts = []
     for one in systems:
         tree, shapes, own, limits = (part.copy() for part in (
@@ -117,7 +119,7 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray,
         tree['v_start'] += v
         shapes['body'] += bodies
         shapes['first_point'] += points
-        shapes['first_vertex'] += vertices
+        shapes['hull'] += hulls
         limits['q'] += q
         limits['dof'] += v
         own['a'] += geoms
@@ -129,15 +131,19 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray,
             body_root=one.body_root + bodies, body_doll=one.body_doll + dolls))
         q, v, bodies = q + coordinate_count(one), v + len(one.dof_parent), bodies + len(tree)
         geoms, points = geoms + len(shapes), points + int(shapes['point_count'].sum())
-        vertices += len(one.vertices)
+        hulls += len(one.hulls)
         dolls += len(one.doll_masses)
     whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in (
         'tree', 'dof_parent', 'dof_body', 'dof_damping', 'body_last_dof', 'body_root', 'body_doll',
-        'geoms', 'joint_limits', 'doll_masses', 'vertices')}
+        'geoms', 'joint_limits', 'doll_masses')}
     scale = energy_scale(whole['tree'], whole['geoms'], parts[0].gravity)
+    static_geoms = static_geoms.copy()
+    static_geoms['hull'] += hulls
     whole['geoms'] = np.concatenate([whole['geoms'], static_geoms])
+    tables = join_hulls([*(HullTables(part.vertices, part.hull_faces, part.hulls)
+                           for part in parts), static_hulls])
     return parts[0]._replace(
-        **whole, energy_scale=scale,
+        **whole, **tables._asdict(), energy_scale=scale,
         pairs=np.concatenate([*(part.pairs for part in parts), pairs]),
         flight_enabled=np.array([min(part.flight_enabled[0] for part in parts)]))
 
@@ -145,8 +151,7 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray,
 def contact_laws(scene: Scene) -> np.ndarray:
     """Friction, rolling friction, m, and restitution (g, 3) of each geom of a scene's dolls."""
     return np.array([scene.material.on(bone) for placement in scene.dolls
-                     for bone in placement.doll.bones for part in bone.shape.parts
-                     for _ in range(geom_count(part.shape))]).reshape(-1, 3)
+                     for bone in placement.doll.bones for _ in bone.shape.parts]).reshape(-1, 3)
 
 
 def make_pairs(geom_pairs: np.ndarray, laws: np.ndarray,
@@ -196,44 +201,44 @@ def _dofs(tree: np.ndarray, count: int) -> dict[str, np.ndarray]:
             'body_last_dof': body_last_dof, 'body_root': body_root, 'body_doll': body_doll}
 
 
-def _geoms(scene: Scene, tree: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """GEOM records of all parts of all bones' shapes, in the scene's order of bones, and vertices
-    (k, 3) m of their hulls.
+def _geoms(scene: Scene, tree: np.ndarray) -> tuple[np.ndarray, HullTables]:
+    """GEOM records of all parts of all bones' shapes, in the scene's order of bones, and their
+    hulls.
     """
     record = {int(bone): place for place, bone in enumerate(tree['bone'])}
     base = np.array(scene.material.on(None))
-    made, vertices, first, first_vertex = [], [np.zeros((0, 3))], 0, 0
+    made, hulls, first = [], [NO_HULLS], 0
     for index, bone in enumerate(scene.bones):
         law = contact_law(np.array(scene.material.on(bone)), base)
         for part in bone.shape.parts:
-            geoms, count, own = _part_geoms(bone, part)
-            geoms['body'] = record[index]
-            geoms['friction'], geoms['rolling_friction'], geoms['restitution'] = law
+            geom, count = _part_geom(bone, part)
+            geom['body'] = record[index]
+            geom['friction'], geom['rolling_friction'], geom['restitution'] = law
             # What does not yield has nothing to do with the ground.
             count = 0 if tree['kinematic'][record[index]] else count
-            geoms['first_point'], geoms['point_count'][0] = first, count
-            geoms['first_vertex'] = first_vertex
-            made.append(geoms)
-            vertices.append(own)
-            first, first_vertex = first + count, first_vertex + len(own)
-    return np.concatenate(made), np.concatenate(vertices)
+            geom['first_point'], geom['point_count'] = first, count
+            if isinstance(part.shape, Hull):
+                geom['hull'] = len(hulls) - 1
+                hulls.append(hull_tables(part.shape))
+            made.append(geom)
+            first += count
+    return np.concatenate(made), join_hulls(hulls)
 
 
-def _part_geoms(bone: Bone, part: Part) -> tuple[np.ndarray, int, np.ndarray]:
-    """GEOM (g,) of a part of a bone, of a hull several, but for body, law and indices; how many
-    points of the first may touch the ground; vertices (k, 3) m of a hull.
+def _part_geom(bone: Bone, part: Part) -> tuple[np.ndarray, int]:
+    """GEOM (1,) of a part of a bone, but for body, law and indices; and how many points of it may
+    touch the ground.
     """
     shape, pose = part.shape, Pose(rotation.rotate(bone.orientation, np.array(part.position)),
                                    rotation.multiply(bone.orientation, np.array(part.orientation)))
     if isinstance(shape, Hull):
-        geoms, vertices = hull_geoms(shape, pose)
-        return geoms, len(vertices), vertices
+        return hull_geom(shape, pose), int(hull_tables(shape).hulls['vertex_count'][0])
     geom = np.zeros(1, GEOM)
     geom['kind'], geom['size'] = SHAPE_KIND[shape.kind], geom_size(shape)
     geom['position'], geom['orientation'] = pose
     geom['bounding_radius'] = bounding_radius(shape)
     geom['reach'] = geom['bounding_radius'] + math.hypot(*part.position)
-    return geom, GROUND_POINTS[shape.kind], np.zeros((0, 3))
+    return geom, GROUND_POINTS[shape.kind]
 
 
 def geom_size(shape: object) -> tuple[float, ...]:
@@ -254,14 +259,11 @@ def bounding_radius(shape: object) -> float:
 
 
 def _within_dolls(scene: Scene, geoms: np.ndarray) -> np.ndarray:
-    """Pairs (p, 2) of ``geoms`` of different bones of one doll that the doll does not exclude;
-    those with a hull follow each other.
-    """
+    """Pairs (p, 2) of ``geoms`` of different bones of one doll that the doll does not exclude."""
     if not scene.self_collision:
         return np.zeros((0, 2), np.int64)
     owner = np.repeat(np.arange(len(scene.bones)), [
-        sum(geom_count(part.shape) for part in bone.shape.parts) for bone in scene.bones])
-    hull = is_of_hull(geoms)
+        len(bone.shape.parts) for bone in scene.bones])
     excluded = set()
     for own, placement in zip(scene.bone_slices, scene.dolls, strict=True):
         place = {bone.name: own.start + k for k, bone in enumerate(placement.doll.bones)}
@@ -269,10 +271,7 @@ def _within_dolls(scene: Scene, geoms: np.ndarray) -> np.ndarray:
                      for pair in placement.doll.excluded_pairs}
     doll = scene.doll_of_bone[owner]
     found = [(a, b) for d in range(len(scene.dolls))
-             for own in [doll == d]
-             for members in [np.concatenate([np.flatnonzero(own & ~hull),
-                                             np.flatnonzero(own & hull)])]
+             for members in [np.flatnonzero(doll == d)]
              for n, a in enumerate(members) for b in members[n + 1:]
-             if owner[a] != owner[b] and not (hull[a] and hull[b])
-             and frozenset((owner[a], owner[b])) not in excluded]
+             if owner[a] != owner[b] and frozenset((owner[a], owner[b])) not in excluded]
     return np.array(found, np.int64).reshape(-1, 2)

@@ -28,7 +28,6 @@ from .doll_states import SNAPSHOT, DollStates, contact_capacity
 from .impact_records import join_impacts, logged_impacts
 from .islands import LARGE_CLUSTER, next_window
 from .static_geoms import NO_KEYS, StaticGeoms
-from .triangle_geoms import is_of_hull
 
 SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'contacts_dropped',
                 'toi_failures', 'restitution_reduced', 'energy_gains', 'work_pushes', 'work_grabs',
@@ -648,7 +647,7 @@ class Clusters:
         laws = np.concatenate([*(self._laws[doll] for doll in dolls),
                                self.static_geoms.laws[static_geoms]])
         system = join_systems(systems, make_pairs(geom_pairs, laws, points),
-                              self.static_geoms.geoms[static_geoms])
+                              *self.static_geoms.take(static_geoms))
         state = make_cluster_state(system, contact_capacity(system))._replace(
             q=self.q[q], v=self.v[v], contact_impulses=self.contact_impulses[bones],
             stats=self.stats[dolls[0]:dolls[0] + 1],
@@ -682,17 +681,14 @@ class Clusters:
 
 def _pairs_of_dolls(dolls: np.ndarray, systems: list[System], pairs: np.ndarray) -> np.ndarray:
     """All pairs (p, 2) of the geoms of ``dolls`` (d,) with the ``systems`` that ``pairs`` (k, 2)
-    of dolls connect; geoms count through all systems. Those of a geom with a hull follow each
-    other; hulls do not meet hulls.
+    of dolls connect; geoms count through all systems.
     """
     firsts = np.cumsum([0, *(len(system.geoms) for system in systems)])
     place = {int(doll): k for k, doll in enumerate(dolls)}
-    of_hull = np.concatenate([is_of_hull(system.geoms) for system in systems])
     found = [NO_PAIRS]
     for one, other in pairs:
         a, b = (np.arange(firsts[k], firsts[k + 1]) for k in (place[int(one)], place[int(other)]))
-        found.append(_every_pair(a[~of_hull[a]], b))
-        found.append(_every_pair(b[~of_hull[b]], a[of_hull[a]]))
+        found.append(_every_pair(a, b))
     return np.concatenate(found)
 
 

@@ -6,18 +6,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....model import rotation
-from ....model.mesh import Surface
+from ....model.mesh import Hull, Surface
 from ....model.plane import Plane
+from ....model.pose import Pose
 from ....model.scene import Scene
 from ....model.scene_change import SceneChange
 from ....model.shapes import Part, support_distance
 from ....model.static_body import StaticBody
-from ...kernels.collision.shapes import HULL, PLANE, SHAPE_KIND, TRIANGLE
+from ...kernels.collision.shapes import HULL, PLANE, SHAPE_KIND
 from ...kernels.dynamics.body import WORLD
 from ...kernels.loaded import aabb_tree
 from ...kernels.system import GEOM
 from .build_system import GROUND_POINTS, bounding_radius, geom_size
-from .triangle_geoms import is_of_hull, triangle_geoms
+from .hull_tables import NO_HULLS, HullTables, hull_geom, hull_tables, join_hulls
+from .triangle_geoms import triangle_geoms
 
 LOOK_AHEAD = 0.1
 """s: what a bone may touch within this time is given to its cluster, when it has to be made anew;
@@ -41,20 +43,25 @@ class StaticGeoms:
     def __init__(self, scene: Scene, reach: np.ndarray) -> None:
         parts = [(index, part) for index, body in enumerate(scene.bodies) for part in body.parts]
         surfaces = [(index, body.shape, body.pose) for index, body in enumerate(scene.bodies)
-                    if isinstance(body.shape, Surface)]
-        surfaces += [(index, part.shape, part.pose) for index, part in parts
-                     if isinstance(part.shape, Surface)]
-        parts = [(index, part) for index, part in parts if not isinstance(part.shape, Surface)]
+                    if isinstance(body.shape, Surface) and not isinstance(body.shape, Hull)]
+        hulls = [(index, body.shape, body.pose) for index, body in enumerate(scene.bodies)
+                 if isinstance(body.shape, Hull)]
+        hulls += [(index, part.shape, part.pose) for index, part in parts
+                  if isinstance(part.shape, Hull)]
+        parts = [(index, part) for index, part in parts if not isinstance(part.shape, Hull)]
         planes = [(index, body) for index, body in enumerate(scene.bodies)
                   if isinstance(body.shape, Plane)]
         own = [_primitive_geoms([part for _, part in parts]),
+               _hull_geoms([(shape, pose) for _, shape, pose in hulls]),
                *(triangle_geoms(shape.triangles, pose) for _, shape, pose in surfaces)]
+        self._hulls = [hull_tables(shape) for _, shape, _ in hulls]
         self.geoms = np.concatenate([*(geoms for geoms, _, _ in own),
                                      _plane_geoms([body for _, body in planes])])
-        """(g,): of primitive shapes, then triangles of surfaces, then planes."""
-        self.bodies = np.concatenate([np.array([index for index, _ in parts], np.int64), *(
+        """(g,): of primitive shapes, then hulls, then triangles of surfaces, then planes."""
+        self.bodies = np.concatenate([np.array(
+            [index for index, *_ in (*parts, *hulls)], np.int64), *(
             np.full(len(geoms), index) for (index, _, _), (geoms, _, _) in zip(
-                surfaces, own[1:], strict=True)),
+                surfaces, own[2:], strict=True)),
             np.array([index for index, _ in planes], np.int64)])
         """(g,): index of each geom's body in the scene's bodies."""
         laws = np.array([scene.material.on(body) for body in scene.bodies]).reshape(-1, 3)
@@ -105,12 +112,19 @@ class StaticGeoms:
 
     def pair_counts(self, moving: np.ndarray, geoms: np.ndarray) -> np.ndarray:
         """Numbers of GEOM_PAIR records (k,) of ``moving`` geoms, their kinds and point counts, with
-        static ones: with a plane one for each point that may touch it. Hulls meet no surfaces.
+        static ones: with a plane one for each point that may touch it.
         """
         kinds, static = moving['kind'], self.geoms['kind'][geoms]
         points = np.where(kinds == HULL, moving['point_count'], POINT_COUNTS[kinds])
-        return np.where(static == PLANE, points,
-                        np.where(is_of_hull(moving) & (static == TRIANGLE), 0, 1))
+        return np.where(static == PLANE, points, 1)
+
+    def take(self, indices: np.ndarray) -> tuple[np.ndarray, HullTables]:
+        """GEOM (k,) of ``indices``, and their hulls."""
+        geoms = self.geoms[indices]
+        of_hulls = np.flatnonzero(geoms['kind'] == HULL)
+        tables = join_hulls([NO_HULLS, *(self._hulls[k] for k in geoms['hull'][of_hulls])])
+        geoms['hull'][of_hulls] = np.arange(len(of_hulls))
+        return geoms, tables
 
     def clear(self) -> None:
         """Forget all pairs."""
@@ -176,6 +190,18 @@ def _plane_geoms(bodies: Sequence[StaticBody]) -> np.ndarray:
 
 Geoms = tuple[np.ndarray, np.ndarray, np.ndarray]
 """GEOM (g,), and the lower and the upper corners (g, 3) m of their bounding boxes."""
+
+
+def _hull_geoms(hulls: Sequence[tuple[Hull, Pose]]) -> Geoms:
+    """Geoms of hulls at their poses in the world."""
+    geoms = np.zeros(len(hulls), GEOM)
+    lower, upper = np.zeros((2, len(hulls), 3))
+    for k, (hull, pose) in enumerate(hulls):
+        geoms[k] = hull_geom(hull, pose)[0]
+        vertices = pose.apply(hull.vertices)
+        lower[k], upper[k] = vertices.min(axis=0), vertices.max(axis=0)
+    geoms['body'], geoms['hull'], geoms['reach'] = WORLD, np.arange(len(hulls)), 0.0
+    return geoms, lower, upper
 
 
 def _primitive_geoms(parts: Sequence[Part]) -> Geoms:

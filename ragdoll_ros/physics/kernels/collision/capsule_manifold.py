@@ -2,7 +2,7 @@
 
 The signed distance of a point from a convex shape is a convex function of the point; so along a
 capsule's axis it has one minimum. Each contact is that of one ball of the axis, with a normal and a
-gap of its own. Only where the axis itself is inside a box or cylinder, which may be deep, the
+gap of its own. Only where the axis itself is inside a box, cylinder or hull, which may be deep, the
 contact is along the axis of largest separation of the whole segment.
 """
 from __future__ import annotations
@@ -13,14 +13,16 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.vectors import Vec3, add, add_scaled, column, dot, put, scale, sub, to_local, to_world
+from .hulls.polyhedron import hull_faces, hull_plane
 from .separating_axis import max_separation_axis
-from .shapes import BOX, CAPSULE, CYLINDER, SPHERE, Shape, signed_distance
+from .shapes import BOX, CAPSULE, CYLINDER, HULL, SPHERE, Shape, signed_distance
 
 CAP_COSINE = 0.7
 """Cosine between normal and cylinder axis above which the cap, not the side, is the support."""
 
 FACE_SINE = 0.5
-"""Component of the normal along a box's axis up to which the face ends at the box's extent."""
+"""Component of the normal along a box's axis, or a hull's other normals, up to which the face ends
+there."""
 
 TIE = 1e-10
 """m: an end of the axis within this of the deepest point is the deepest point."""
@@ -97,6 +99,15 @@ def _clip_to_slab(interval: tuple[float, float], p: float, u: float,
 
 
 @compiled
+def _clip_to_half_space(interval: tuple[float, float], p: float, u: float) -> tuple[float, float]:
+    """The part of an interval of t where p + t u <= 0; end < start if empty."""
+    lo, hi = interval
+    if abs(u) < 1e-12:
+        return (lo, hi) if p <= 0 else (1.0, 0.0)
+    return (lo, min(hi, -p / u)) if u > 0 else (max(lo, -p / u), hi)
+
+
+@compiled
 def _clip_to_face(shape: Shape, p: Vec3, u: Vec3, half: float, n: Vec3) -> tuple[float, float]:
     """Interval of t where p + t u is above the shape's face of normal n; end < start if empty."""
     size, interval = shape.size, (-half, half)
@@ -107,6 +118,12 @@ def _clip_to_face(shape: Shape, p: Vec3, u: Vec3, half: float, n: Vec3) -> tuple
             interval = _clip_to_slab(interval, p[1], u[1], size[1])
         if abs(n[2]) < FACE_SINE:
             interval = _clip_to_slab(interval, p[2], u[2], size[2])
+    elif shape.kind == HULL:
+        first, end = hull_faces(shape.system, shape.hull)
+        for k in range(first, end):
+            normal, offset = hull_plane(shape.system, k)
+            if abs(dot(normal, n)) < FACE_SINE:
+                interval = _clip_to_half_space(interval, dot(normal, p) - offset, dot(normal, u))
     elif shape.kind == CYLINDER and abs(n[2]) > CAP_COSINE:
         across = u[0] * u[0] + u[1] * u[1]
         middle = -(p[0] * u[0] + p[1] * u[1]) / max(across, 1e-12)

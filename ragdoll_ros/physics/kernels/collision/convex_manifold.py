@@ -1,4 +1,4 @@
-"""Contact manifolds of boxes and cylinders: one shape's face clipped by the sides of the other's.
+"""Contact manifolds of boxes, cylinders and hulls: one's face clipped by the sides of the other's.
 
 The reference face is the one more nearly perpendicular to the contact normal n. Polygons are seen
 and gaps measured along n, not along the face's normal, so that the deepest point is as deep as the
@@ -11,13 +11,14 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..maths.vectors import Vec3, add, add_scaled, column, dot, neg, put, scale, sub, vec
+from ..maths.vectors import Vec3, add, add_scaled, dot, neg, put, scale, sub, vec
 from .clipping import MAX_CLIPPED, clip_polygon
-from .features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, supporting_edge,
-                       supporting_face)
+from .features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, face_normal,
+                       supporting_edge, supporting_face)
 from .manifold import CLIP_VERTEX, merge_points, reduce_points, sort_points
-from .separating_axis import FACE_BIAS, FACE_BIAS_RATIO, Axis, face_or_edge_axis, refine_axis
-from .shapes import BOX, CYLINDER, Shape, bounding_radius, support_point
+from .separating_axis import (FACE_BIAS, FACE_BIAS_RATIO, Axis, face_or_edge_axis, needs_search,
+                              refine_axis)
+from .shapes import CYLINDER, HULL, Shape, bounding_radius, moved_to, support_point
 
 FACE_COSINE = math.sqrt(1 - FEATURE_SINE * FEATURE_SINE)
 
@@ -29,7 +30,7 @@ MERGE_RATIO = 1e-3
 
 FACE_TIE = 1e-10
 """Faces whose cosines differ by less are equal: the reference is b, which may be static, so that
-the points on it are corners of a as when a is tilted; it is a if that alone is a box."""
+the points on it are corners of a as when a is tilted; it is a if b alone is a cylinder."""
 
 DEPTH_TOLERANCE = 1e-10
 """m: tolerance of the deepest point's gap against the shapes' separation where the axis is no face
@@ -39,6 +40,15 @@ CORNER_IDS = 12 * 6 * 2 * MAX_CORNERS * 2 * MAX_CORNERS
 """First of the feature ids of corners on the reference face, whichever the incident face is: below
 it points are known by both faces and the sides that meet there."""
 
+MAX_FACES, MAX_VERTICES = 4096, 65536
+"""Of a hull: beyond them ids repeat, and a point may count as another that lasts."""
+
+FIRST_HULL_ID = 2 * CORNER_IDS
+HULL_CORNER_IDS = FIRST_HULL_ID + 2 * MAX_FACES * MAX_FACES * (2 * MAX_CORNERS) ** 2
+END_OF_IDS = HULL_CORNER_IDS + 2 * MAX_FACES * MAX_VERTICES
+"""Ids of points of hulls: of two faces and the sides that meet, and of corners of the incident one
+on the reference face; none is larger."""
+
 CLOSEST_POINTS_ID = 2 * MAX_CORNERS * 2 * MAX_CORNERS - 1
 """Feature id of the contact at the closest points, which no two sides of faces have."""
 
@@ -47,7 +57,7 @@ CLOSEST_POINTS_ID = 2 * MAX_CORNERS * 2 * MAX_CORNERS - 1
 def _contact_axis(a: Shape, b: Shape, c: Vec3, margin: float) -> Axis:
     """The best face normal, unless another axis is clearly better; c: from b's center to a's."""
     sat = face_or_edge_axis(a, b, c, 1.0, margin)
-    if sat[0] <= margin and (a.kind == CYLINDER or b.kind == CYLINDER):
+    if sat[0] <= margin and needs_search(a, b):
         refined = refine_axis(a, b, c, sat)
         if refined[0] > sat[0] + FACE_BIAS + FACE_BIAS_RATIO * abs(sat[0]):
             return refined
@@ -56,20 +66,20 @@ def _contact_axis(a: Shape, b: Shape, c: Vec3, margin: float) -> Axis:
 
 @compiled
 def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
-    """Write the manifold of two boxes or cylinders; arguments and return value as collide()."""
+    """Write the manifold of boxes, cylinders or hulls; arguments and return value as collide()."""
     origin = b.position
-    a = Shape(a.kind, a.size, sub(a.position, origin), a.rotation, a.edges, 0)
-    b = Shape(b.kind, b.size, (0.0, 0.0, 0.0), b.rotation, b.edges, 0)
+    a, b = moved_to(a, sub(a.position, origin)), moved_to(b, (0.0, 0.0, 0.0))
     s, n = _contact_axis(a, b, a.position, margin)
     if s > margin:
         return 0
-    scratch = np.empty(2 * MAX_CLIPPED + MAX_CORNERS, CLIP_VERTEX)
+    scratch = np.empty(2 * MAX_CLIPPED + 2 * MAX_CORNERS, CLIP_VERTEX)
     points = scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
-    cosine_a, cosine_b = face_cosine(a, n), face_cosine(b, n)
+    cosine_a, cosine_b = face_cosine(a, neg(n)), face_cosine(b, n)
     cosine = max(cosine_a, cosine_b)
     along_face = cosine > 1 - FACE_TIE
     incident, reference, sign = b, a, -1.0
-    if cosine_b > cosine_a + (FACE_TIE if a.kind == BOX and b.kind != BOX else -FACE_TIE):
+    is_on_a = a.kind != CYLINDER and b.kind == CYLINDER
+    if cosine_b > cosine_a + (FACE_TIE if is_on_a else -FACE_TIE):
         incident, reference, sign = a, b, 1.0
     if cosine >= FACE_COSINE:
         count = _clip_faces(incident, reference, n, sign, scratch)
@@ -109,19 +119,28 @@ def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
     -1.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
-    corners = scratch[2 * MAX_CLIPPED:]
+    corners, names = (scratch[2 * MAX_CLIPPED:2 * MAX_CLIPPED + MAX_CORNERS],
+                      scratch[2 * MAX_CLIPPED + MAX_CORNERS:])
     outward, inward = scale(sign, n), scale(-sign, n)
     number, incident_face = supporting_face(incident, inward, (0.0, 0.0, 0.0), polygon)
     deepest = sub(add(incident.position, support_point(incident, inward)), reference.position)
     count, face = supporting_face(reference, outward, deepest, corners)
+    if count % 2:
+        corners[count] = corners[count - 1]
+        count += 1
     offset = sub(incident.position, reference.position)
     for i in range(number):
         put(polygon[i].point, add(vec(polygon[i].point), offset))
+        names[i].feature_id = polygon[i].feature_id
         polygon[i].feature_id = corner_id(incident, incident_face, i)
     number = clip_polygon(corners, count, n, polygon, number, points)
-    normal = column(reference.rotation, face // 2 if reference.kind == BOX else 2)
+    normal = face_normal(reference, face)
     origin, cosine = vec(corners[0].point), dot(normal, n)
     faces = ((6 if sign > 0 else 0) + face) * 6 + incident_face
+    has_hull = incident.kind == HULL or reference.kind == HULL
+    if has_hull:
+        faces = ((MAX_FACES if sign > 0 else 0) + face % MAX_FACES) * MAX_FACES + (
+            incident_face % MAX_FACES)
     for i in range(number):
         vertex, side = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
         height = dot(normal, sub(vec(vertex.point), origin)) / cosine
@@ -130,8 +149,15 @@ def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
         points[i].gap = sign * height
         points[i].feature_id = (
             faces * 2 * MAX_CORNERS + side) * 2 * MAX_CORNERS + vertex.feature_id
+        if has_hull:
+            points[i].feature_id += FIRST_HULL_ID
         if side < MAX_CORNERS and vertex.feature_id < MAX_CORNERS:
-            points[i].feature_id = CORNER_IDS + faces // 6 * MAX_CORNERS + vertex.feature_id
+            corner = vertex.feature_id
+            points[i].feature_id = CORNER_IDS + faces // 6 * MAX_CORNERS + corner
+            if has_hull:
+                corner = names[corner].feature_id if incident.kind == HULL else corner
+                points[i].feature_id = HULL_CORNER_IDS + (
+                    faces // MAX_FACES * MAX_VERTICES + corner % MAX_VERTICES)
     return number
 
 

@@ -1,4 +1,4 @@
-"""Supporting features of boxes and cylinders: the face, edge or vertex that a direction selects."""
+"""Supporting features of boxes, cylinders and hulls: a face, edge or vertex by its direction."""
 from __future__ import annotations
 
 import math
@@ -6,8 +6,10 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..maths.vectors import Vec3, add_scaled, column, put, scale, to_local, to_world
-from .shapes import BOX, Shape
+from ..maths.vectors import (Vec3, add_scaled, column, dot, put, scale, to_local, to_world,
+                             vec)
+from .hulls.polyhedron import face_polygon, hull_plane, nearest_face, supporting_hull_edge
+from .shapes import BOX, HULL, Shape
 
 FEATURE_SINE = 0.1
 """Sine of the angle up to which a face, an edge or a line of a side is perpendicular to n."""
@@ -26,10 +28,17 @@ MAX_CORNERS = len(OCTAGON)
 def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tuple[int, int]:
     """Write the corners of the face that supports along the unit vector n (world) to ``corners``,
     from the shape's center, m, world axes. Returns their number (4: face, 8: cap, 2: line of a
-    side) and the face's id. A cap has the corners of a regular octagon, except that the one closest
-    to the support point is put there; if all of the cap supports, that closest to direction ``t``.
+    side, 3 to 8: face of a hull, where feature ids are its vertices) and the face's id. A cap has
+    the corners of a regular octagon, except that the one closest to the support point is put there;
+    if all of the cap supports, that closest to direction ``t``.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
+    if shape.kind == HULL:
+        face = nearest_face(shape.system, shape.hull, (x, y, z))
+        count = face_polygon(shape.system, shape.hull, face, corners)
+        for k in range(count):
+            put(corners[k].point, to_world(shape.rotation, vec(corners[k].point)))
+        return count, face
     if shape.kind == BOX:
         return 4, _box_face(shape, (x, y, z), corners)
     across, end = math.sqrt(x * x + y * y), math.copysign(size[1], z)
@@ -85,9 +94,22 @@ def corner_id(shape: Shape, face: int, k: int) -> int:
 
 @compiled
 def face_cosine(shape: Shape, n: Vec3) -> float:
-    """Cosine between n (world) and the closest normal of a box's face or a cylinder's cap."""
+    """Cosine between n (world) and the closest normal of a box's or hull's face or a cylinder's
+    cap.
+    """
     x, y, z = to_local(shape.rotation, n)
+    if shape.kind == HULL:
+        face = nearest_face(shape.system, shape.hull, (x, y, z))
+        return dot(hull_plane(shape.system, face)[0], (x, y, z))
     return max(abs(x), abs(y), abs(z)) if shape.kind == BOX else abs(z)
+
+
+@compiled
+def face_normal(shape: Shape, face: int) -> Vec3:
+    """Normal (world), inwards or outwards, of the face with this id of a box, hull or cylinder."""
+    if shape.kind == HULL:
+        return to_world(shape.rotation, hull_plane(shape.system, face)[0])
+    return column(shape.rotation, face // 2 if shape.kind == BOX else 2)
 
 
 @compiled
@@ -97,6 +119,9 @@ def supporting_edge(shape: Shape, n: Vec3) -> tuple[Vec3, Vec3]:
     is 0.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
+    if shape.kind == HULL:
+        middle, half = supporting_hull_edge(shape.system, shape.hull, (x, y, z))
+        return to_world(shape.rotation, middle), to_world(shape.rotation, half)
     a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if shape.kind == BOX:
         a, b, c = (math.copysign(size[0], x), math.copysign(size[1], y), math.copysign(size[2], z))

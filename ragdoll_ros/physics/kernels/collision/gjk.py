@@ -1,8 +1,8 @@
 """Closest points of two disjoint convex shapes: GJK.
 
 Gilbert, Johnson, Keerthi, A fast procedure for computing the distance between complex objects in
-three-dimensional space, 1988: the point nearest to the origin of the Minkowski difference. As all
-shapes are symmetric about their centres, it is c - scale (a + b) here.
+three-dimensional space, 1988: the point nearest to the origin of the Minkowski difference, here
+c - scale (b - a), a and b about their centres.
 """
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.vectors import Vec3, add, add_scaled, cross, divide, dot, put, scale, sub, vec
-from .shapes import Shape, support_point
+from .shapes import Shape, opposite_point, support_point
 
 MAX_ITERATIONS = 60
 """After which the best direction so far is taken; 5 to 20 are usual, most where rims meet."""
@@ -42,7 +42,7 @@ def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: floa
         put(simplex[k].point, add_scaled(c, -ratio, vec(simplex[k].support)))
     for step in range(MAX_ITERATIONS):
         if step > 0 or count == 0:
-            support = add(support_point(a, n), support_point(b, n))
+            support = add(opposite_point(a, n), support_point(b, n))
             point = add_scaled(c, -ratio, support)
             if step > 0 and square - dot(v, point) <= tolerance * square:
                 break

@@ -1,15 +1,16 @@
 """Narrow phase: contact manifold and separation of two shapes.
 
 Spheres and capsules are cores with a radius (capsule_manifold.py); boxes and cylinders have
-separating axes (separating_axis.py) and faces that are clipped (convex_manifold.py). Triangles, of
-surfaces, limit the normals at their edges (triangles/); one of both shapes at most is a triangle.
+separating axes (separating_axis.py) and faces that are clipped (convex_manifold.py), and so have
+hulls. Triangles, of surfaces, limit the normals at their edges (triangles/); they never move, and
+are the second shape of a pair.
 """
 from __future__ import annotations
 
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..maths.vectors import dot, neg, put, sub, vec
+from ..maths.vectors import dot, sub
 from .capsule_manifold import capsule_manifold, capsule_separation
 from .convex_manifold import convex_manifold
 from .separating_axis import max_separation_axis
@@ -30,11 +31,6 @@ def collide(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
         return 0
     if b.kind == TRIANGLE:
         return triangle_manifold(a, b, margin, manifold)
-    if a.kind == TRIANGLE:
-        count = triangle_manifold(b, a, margin, manifold)
-        for i in range(count):
-            put(manifold[i].normal, neg(vec(manifold[i].normal)))
-        return count
     sign = 1.0
     if b.kind <= CAPSULE < a.kind:
         a, b, sign = b, a, -1.0
@@ -54,8 +50,6 @@ def separation(a: Shape, b: Shape, cutoff: float) -> float:
     """
     if b.kind == TRIANGLE:
         return triangle_separation(a, b)
-    if a.kind == TRIANGLE:
-        return triangle_separation(b, a)
     if b.kind <= CAPSULE < a.kind:
         a, b = b, a
     if a.kind <= CAPSULE:

@@ -1,12 +1,13 @@
-"""Separating axes of boxes and cylinders (and of capsules' axes with them).
+"""Separating axes of boxes, cylinders and hulls (and of capsules' axes with them).
 
-Along a unit vector n from b to a two convex shapes are separated by s(n) = c n - h_a(n) - h_b(n),
+Along a unit vector n from b to a two convex shapes are separated by s(n) = c n - h_a(-n) - h_b(n),
 c the offset of a's centre from b's, h their support functions. The largest s over all n is positive
 if and only if they are disjoint, and else minus their penetration depth.
 
 Two boxes: it is along one of 15 axes, face normals and cross products of edges (SAT: Gottschalk,
-Lin, Manocha, OBBTree, 1996). With a cylinder it may also be where a rim meets an edge or a rim.
-Then these axes are the start of two searches, both with GJK on disjoint shapes (gjk.py):
+Lin, Manocha, OBBTree, 1996). With a cylinder it may also be where a rim meets an edge or a rim. Of
+a hull the faces are tried, and where it overlaps the products of its edges, which are many. Then
+these axes are the start of two searches, both with GJK on disjoint shapes (gjk.py):
 
 - of overlapping shapes the growth distance (Gilbert, Ong, 1994): the scale about their centres at
   which they touch; the axis there is the side to separate them to;
@@ -18,9 +19,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, neg, norm
+from ..maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, scale,
+                             to_world)
 from .gjk import SIMPLEX_VERTEX, Direction, closest_direction
-from .shapes import BOX, CAPSULE, CYLINDER, Shape, bounding_radius, core_extent
+from .hulls.polyhedron import hull_edge, hull_edges, hull_faces, hull_plane
+from .shapes import BOX, CAPSULE, CYLINDER, HULL, Shape, bounding_radius, core_extent
 
 PARALLEL_SINE = 1e-8
 """Sine between two edges below which face normals replace their cross product."""
@@ -31,6 +34,10 @@ parallel faces rounding alone would choose; what is missed is less than a contac
 
 SHRINK_RATIO = 0.98
 """Of the scale at which shapes touch: small enough for well-defined closest points."""
+
+DEEP_RATIO = 1e-3
+"""Of the smaller bounding radius: a depth up to which the searches from the best face of a hull end
+at the axis of largest separation. Bodies that rest are less deep in each other."""
 
 GAP_RATIO = 1e-3
 """Of the shapes' size: the gap at which their closest points are computed."""
@@ -48,7 +55,7 @@ Axis = tuple[float, Vec3]
 @compiled
 def separation_along(a: Shape, b: Shape, c: Vec3, n: Vec3) -> float:
     """Separation s(n), m; of a capsule that of its axis."""
-    return dot(c, n) - core_extent(a, n) - core_extent(b, n)
+    return dot(c, n) - core_extent(a, neg(n)) - core_extent(b, n)
 
 
 @compiled
@@ -63,15 +70,23 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
     faces_a = 3 if a.kind == CAPSULE else first_a
     bar = -MAX_PENETRATION
     for body in range(2):
-        rotation = a.rotation if body == 0 else b.rotation
-        for k in range(faces_a if body == 0 else first_b, 3):
-            n = _towards(c, column(rotation, k))
+        shape, sign = (a, -1.0) if body == 0 else (b, 1.0)
+        first, end = faces_a if body == 0 else first_b, 3
+        if shape.kind == HULL:
+            first, end = hull_faces(shape.system, shape.hull)
+        for k in range(first, end):
+            if shape.kind == HULL:
+                n = scale(sign, to_world(shape.rotation, hull_plane(shape.system, k)[0]))
+            else:
+                n = _towards(c, column(shape.rotation, k))
             found = separation_along(a, b, c, n)
             if found > s and found > bar:
                 s, axis = found, n
                 if s > cutoff:
                     return s, axis
         bar = s + bias * (FACE_BIAS + FACE_BIAS_RATIO * abs(s))
+    if a.kind == HULL or b.kind == HULL:
+        return _hull_edge_axis(a, b, c, (s, axis))
     for i in range(first_a, 3):
         for j in range(first_b, 3):
             n = cross(column(a.rotation, i), column(b.rotation, j))
@@ -85,6 +100,50 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
                 if s > cutoff:
                     return s, axis
     return s, axis
+
+
+@compiled
+def _hull_edge_axis(a: Shape, b: Shape, c: Vec3, best: Axis) -> Axis:
+    """The better of an axis and the products of edges of shapes of which one is a hull, if they
+    overlap by more than DEEP_RATIO along that axis; else it is returned.
+    """
+    if best[0] > -DEEP_RATIO * min(bounding_radius(a), bounding_radius(b)):
+        return best
+    for i in range(_edge_count(a)):
+        for j in range(_edge_count(b)):
+            n = cross(_edge(a, i), _edge(b, j))
+            length = norm(n)
+            if length < PARALLEL_SINE:
+                continue
+            n = _towards(c, divide(n, length))
+            found = separation_along(a, b, c, n)
+            if found > best[0]:
+                best = found, n
+    return best
+
+
+@compiled
+def _edge_count(shape: Shape) -> int:
+    """Number of directions of edges: of a cylinder or a capsule its axis."""
+    if shape.kind == HULL:
+        return hull_edges(shape.system, shape.hull)
+    return 3 if shape.kind == BOX else 1
+
+
+@compiled
+def _edge(shape: Shape, k: int) -> Vec3:
+    """Direction k of an edge, world, of any length."""
+    if shape.kind == HULL:
+        return to_world(shape.rotation, hull_edge(shape.system, shape.hull, k))
+    return column(shape.rotation, k if shape.kind == BOX else 2)
+
+
+@compiled
+def needs_search(a: Shape, b: Shape) -> bool:
+    """Whether another axis than face_or_edge_axis() finds may be the one of largest separation:
+    where a rim touches, or edges of a hull.
+    """
+    return (a.kind == CYLINDER or b.kind == CYLINDER or a.kind == HULL or b.kind == HULL)
 
 
 @compiled
@@ -121,7 +180,7 @@ def refine_axis(a: Shape, b: Shape, c: Vec3, start: Axis) -> Axis:
 def max_separation_axis(a: Shape, b: Shape, c: Vec3, cutoff: float) -> Axis:
     """The axis of largest separation of all, or one with a separation above ``cutoff``, m."""
     start = face_or_edge_axis(a, b, c, 0.0, cutoff)
-    if start[0] <= cutoff and (a.kind == CYLINDER or b.kind == CYLINDER):
+    if start[0] <= cutoff and needs_search(a, b):
         return refine_axis(a, b, c, start)
     return start
 

@@ -2,10 +2,10 @@
 
 Kinds and sizes, m: sphere (radius, 0, 0); capsule (radius, half length of its axis, 0); box (half
 extents); cylinder (radius, half length, 0). The axis of a capsule or cylinder is its own z axis.
-These are symmetric about their centre, so that their support functions are even. A triangle, of a
-surface, is not, and has functions of its own: see triangles/triangle.py. A plane through its
-position, its z axis the normal, is no shape of these functions: contact/gaps.py treats it as the
-ground. Nor is a hull, which has a bounding sphere and vertices; its triangles collide.
+These are symmetric about their centre, so that their support functions are even. A hull (radius
+about its centroid, 0, 0) is not: see hulls/polyhedron.py. Nor is a triangle, of a surface, which
+has functions of its own: see triangles/triangle.py. A plane through its position, its z axis the
+normal, is no shape of these functions: contact/gaps.py treats it as the ground.
 """
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..dynamics.body import WORLD
-from ..maths.vectors import Vec3, divide, norm, to_local, to_world, vec
+from ..compiling.bundle import address_of
+from ..maths.vectors import Vec3, divide, dot, neg, norm, to_local, to_world, vec
+from ..system import System
+from .hulls.polyhedron import hull_distance, hull_support
 
 SPHERE, CAPSULE, BOX, CYLINDER, TRIANGLE, PLANE, HULL = 0, 1, 2, 3, 4, 5, 6
 """Kinds of shapes. Spheres and capsules, which are a core with a radius, come first."""
@@ -27,7 +29,7 @@ SHAPE_KIND = {'sphere': SPHERE, 'capsule': CAPSULE, 'box': BOX, 'cylinder': CYLI
 
 class Shape(NamedTuple):
     """A shape at a pose: kind, size, centre (m, world), rotation matrix (3, 3) to the world, the
-    edges of a triangle, and whether it is of a hull that moves.
+    edges of a triangle; of a hull the address of its System and its index in System.hulls.
     """
 
     kind: int
@@ -35,14 +37,22 @@ class Shape(NamedTuple):
     position: Vec3
     rotation: np.ndarray
     edges: Vec3 = (0.0, 0.0, 0.0)
-    is_of_hull: int = 0
+    system: int = 0
+    hull: int = 0
 
 
 @compiled
-def shape_at(geom: np.record, position: np.ndarray, rotation: np.ndarray) -> Shape:
+def shape_at(s: System, geom: np.record, position: np.ndarray, rotation: np.ndarray) -> Shape:
     """The shape of a geom whose centre (3,), m, and rotation (3, 3) in the world are given."""
     return Shape(geom.kind, vec(geom.size), vec(position), rotation, vec(geom.edges),
-                 int(geom.body != WORLD))
+                 address_of(s), geom.hull)
+
+
+@compiled
+def moved_to(shape: Shape, position: Vec3) -> Shape:
+    """A shape with its centre at ``position``, m."""
+    return Shape(shape.kind, shape.size, position, shape.rotation, shape.edges, shape.system,
+                 shape.hull)
 
 
 @compiled
@@ -62,10 +72,12 @@ def bounding_radius(shape: Shape) -> float:
 
 @compiled
 def core_extent(shape: Shape, n: Vec3) -> float:
-    """Half-width, m, of a shape's core along the unit vector n (world): its support function about
-    the centre, of a capsule that of its axis, without the radius. No spheres.
+    """Extent, m, of a shape's core along the unit vector n (world): its support function about the
+    centre, of a capsule that of its axis, without the radius. No spheres.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
+    if shape.kind == HULL:
+        return dot(hull_support(shape.system, shape.hull, (x, y, z)), (x, y, z))
     if shape.kind == BOX:
         return size[0] * abs(x) + size[1] * abs(y) + size[2] * abs(z)
     if shape.kind == CAPSULE:
@@ -75,8 +87,8 @@ def core_extent(shape: Shape, n: Vec3) -> float:
 
 @compiled
 def extent(shape: Shape, n: Vec3) -> float:
-    """Half-width, m, of a shape along the unit vector n (world): its support function; of a
-    triangle the radius of its bounding sphere, which is more.
+    """Extent, m, of a shape along the unit vector n (world): its support function; of a triangle
+    the radius of its bounding sphere, which is more.
     """
     if shape.kind == SPHERE:
         return shape.size[0]
@@ -90,12 +102,22 @@ def extent(shape: Shape, n: Vec3) -> float:
 def support_point(shape: Shape, n: Vec3) -> Vec3:
     """Point of a shape's core farthest along n, from the centre, m, world axes; no spheres."""
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
+    if shape.kind == HULL:
+        return to_world(shape.rotation, hull_support(shape.system, shape.hull, (x, y, z)))
     if shape.kind == BOX:
         return to_world(shape.rotation, (
             math.copysign(size[0], x), math.copysign(size[1], y), math.copysign(size[2], z)))
     across = math.sqrt(x * x + y * y)
     radius = 0.0 if shape.kind == CAPSULE or across == 0 else size[0] / across
     return to_world(shape.rotation, (x * radius, y * radius, math.copysign(size[1], z)))
+
+
+@compiled
+def opposite_point(shape: Shape, n: Vec3) -> Vec3:
+    """Minus the point of a shape's core farthest against n: of one that is symmetric the point
+    farthest along n.
+    """
+    return neg(support_point(shape, neg(n))) if shape.kind == HULL else support_point(shape, n)
 
 
 @compiled
@@ -115,6 +137,8 @@ def signed_distance(shape: Shape, p: Vec3, u: Vec3) -> tuple[float, Vec3]:
     Ericson, Real-Time Collision Detection (2005), section 5.1.
     """
     size = shape.size
+    if shape.kind == HULL:
+        return hull_distance(shape.system, shape.hull, p)
     if shape.kind == BOX:
         return _box_distance(size, p)
     if shape.kind == CYLINDER:

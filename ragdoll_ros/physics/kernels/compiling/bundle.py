@@ -69,6 +69,15 @@ def bundle_at(kind: Bundle) -> Callable[[int], object]:
     return at
 
 
+@intrinsic
+def address_of(context: object, bundle: types.Type) -> tuple:
+    """The address of a bundle's row."""
+    def generate(context: object, builder: ir.IRBuilder, signature: object,
+                 values: list) -> ir.Value:
+        return builder.ptrtoint(values[0], WORD)
+    return types.int64(bundle), generate
+
+
 @infer_getattr
 class _Fields(AttributeTemplate):
     """Tells numba the types of a bundle's fields."""

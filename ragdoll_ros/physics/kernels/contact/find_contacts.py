@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from ..collision.convex_manifold import END_OF_IDS
 from ..collision.narrow_phase import collide
 from ..collision.shapes import CYLINDER, PLANE, TRIANGLE
 from ..collision.triangles.triangle_manifold import ON_FACE
@@ -20,7 +21,7 @@ from .patch import contract_friction_points
 from .placed_shape import placed_shape
 from .point_gaps import points_at_start, takes_part
 
-IDS_PER_PAIR = 32768
+IDS_PER_PAIR = 1 << END_OF_IDS.bit_length()
 """Range of ids that the points of one pair have."""
 
 KINEMATIC_FRICTION = 0.7
@@ -124,13 +125,9 @@ def add_pair_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
             continue
         c.kind = ROLLING if pair.rolling_friction > 0 else FRICTIONAL
         c.body_a, c.body_b, c.id = a.body, b.body, first_id + at.feature_id
-        if b.kind == TRIANGLE and b.body == WORLD and at.feature_id < ON_FACE:
+        if b.kind == TRIANGLE and at.feature_id < ON_FACE:
             c.id = id_on_plane(s, pair.a, vec(at.normal), at.feature_id)
-        # Of a hull's flat face all triangles have one patch, and a corner on it one id.
-        face = a.face + b.face
-        if face and at.feature_id < ON_FACE:
-            c.id -= IDS_PER_PAIR * face
-        c.patch = len(s.geoms) + k - face
+        c.patch = len(s.geoms) + k
         put(c.point, vec(at.point))
         put(c.normal, vec(at.normal))
         c.gap, c.friction, c.rolling_friction = at.gap, pair.friction, pair.rolling_friction

@@ -2,8 +2,7 @@
 
 In order: heights of each geom's ground points, m; distances of each limited joint from its lower
 and its upper limit, rad; separations of the pairs of geoms, m, where they are far a lower bound,
-EXCLUDED with a hull, whose triangles have their own, and NEAR at internal edges; in a step, those
-of the points of pairs that touch (point_gaps.py).
+and NEAR at internal edges; in a step, those of the points of pairs that touch (point_gaps.py).
 """
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ from ..collision.shapes import BOX, CAPSULE, HULL, PLANE, SPHERE, extent
 from ..compiling.decorators import compiled
 from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics, body_velocity, forward_kinematics, place_geoms
-from ..maths.vectors import Vec3, column, divide, dot, norm, sub, to_local, vec
+from ..maths.vectors import Vec3, column, divide, dot, neg, norm, sub, to_local, vec
 from ..system import JOINT_OUTSIDE_LIMITS, OVERLAPPING, System
 from ..workspace import Contacts, Workspace
 from .internal_edges import FLUSH, is_at_internal_edge
@@ -103,7 +102,6 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
         for i in range(len(s.tree)):
             velocity, motion[i].angular_speed = body_velocity(kin, i)
             motion[i].speed = norm(velocity)
-    far_until, hull_gap = 0, 0.0
     for k in range(len(s.pairs)):
         if k < len(ws.excluded) and ws.excluded[k]:
             out[n + k] = EXCLUDED
@@ -120,13 +118,6 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
                 i = s.pairs[k].a
                 ground_gaps(s, a, kin.geom_positions[i], kin.geom_rotations[i], normal, offset,
                             n + k, out)
-            continue
-        if a.kind == HULL or b.kind == HULL:
-            out[n + k], hull_gap = EXCLUDED, bounding_gap(s, k, kin)
-            far_until = k + 1 + a.triangles + b.triangles if hull_gap > NEAR else 0
-            continue
-        if k < far_until:
-            out[n + k] = hull_gap
             continue
         least = before[n + k] - 2 * (geom_motion_bound(motion, a, h)
                                      + geom_motion_bound(motion, b, h))
@@ -211,7 +202,8 @@ def ground_gaps(s: System, geom: np.record, position: np.ndarray, r: np.ndarray,
                               + (c if k & 4 else -c))
     elif geom.kind == HULL:
         for k in range(geom.point_count):
-            out[first + k] = high + dot(vec(s.vertices[geom.first_vertex + k]), (a, b, c))
+            vertex = vec(s.vertices[s.hulls[geom.hull].first_vertex + k])
+            out[first + k] = high + dot(vertex, (a, b, c))
     else:
         low = size[0] * math.sqrt(max(0.0, 1 - c * c))
         a, b, c = a * size[0], b * size[0], c * size[1]
@@ -245,7 +237,7 @@ def ground_point(s: System, geom: np.record, k: int, position: np.ndarray, r: np
         x, y, z = (size[0] if k & 1 else -size[0], size[1] if k & 2 else -size[1],
                    size[2] if k & 4 else -size[2])
     elif geom.kind == HULL:
-        x, y, z = vec(s.vertices[geom.first_vertex + k])
+        x, y, z = vec(s.vertices[s.hulls[geom.hull].first_vertex + k])
     else:
         z, k = (size[1] if k >= 5 else -size[1]), k % 5
         if k == 0:
@@ -317,8 +309,6 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
     lower bound, by their bounding spheres or their extents along the line of their centers.
     """
     i, j = s.pairs[k].a, s.pairs[k].b
-    if s.geoms[i].kind == HULL or s.geoms[j].kind == HULL:
-        return EXCLUDED
     direction = sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))
     length = norm(direction)
     far = length - (s.geoms[i].bounding_radius + s.geoms[j].bounding_radius)
@@ -327,18 +317,10 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
     a, b = placed_shape(s, kin, i), placed_shape(s, kin, j)
     if length > NEAR:
         direction = divide(direction, length)
-        far = length - extent(a, direction) - extent(b, direction)
+        far = length - extent(a, neg(direction)) - extent(b, direction)
         if far > NEAR:
             return far
     return separation(a, b, NEAR)
-
-
-@compiled
-def bounding_gap(s: System, k: int, kin: Kinematics) -> float:
-    """Separation, m, of the bounding spheres of pair k."""
-    i, j = s.pairs[k].a, s.pairs[k].b
-    return norm(sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))) - (
-        s.geoms[i].bounding_radius + s.geoms[j].bounding_radius)
 
 
 @compiled

@@ -10,4 +10,4 @@ from ..system import System
 @compiled
 def placed_shape(s: System, kin: Kinematics, k: int) -> Shape:
     """Geom k at its pose in ``kin``; after place_geoms()."""
-    return shape_at(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k])
+    return shape_at(s, s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k])

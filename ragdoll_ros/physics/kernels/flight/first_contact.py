@@ -7,7 +7,7 @@ import numpy as np
 
 from ..cluster_state import ClusterState
 from ..collision.narrow_phase import collide
-from ..collision.shapes import PLANE, TRIANGLE
+from ..collision.shapes import PLANE
 from ..compiling.decorators import compiled
 from ..contact.gaps import (FAR, NEAR, TOUCHING, ground_point, plane_of,
                             update_kinematics_and_gaps)
@@ -110,8 +110,6 @@ def pair_time_to_close(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
             least = min(least, time_to_close(manifold[j].gap - contact, closing, acceleration))
         if found:
             return least
-        if a.kind == TRIANGLE or (b.kind == TRIANGLE and b.body != WORLD):
-            gap = NEAR  # another triangle of the hull has what is nearest
     one, turn_a = body_velocity(kin, a.body)
     closing = norm(one) + turn_a * a.reach
     if b.body != WORLD:

@@ -8,13 +8,14 @@ The rim of a cylinder against an edge is taken for less apart than it is.
 """
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from ...compiling.decorators import compiled
-from ...maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, sub)
-from ..shapes import BOX, CAPSULE, CYLINDER, SPHERE, Shape, core_extent
-from .triangle import (FLAT, Corners, allowed_at_edge, corners_of, edge_vectors,
+from ...maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, sub,
+                               to_world)
+from ..hulls.polyhedron import hull_edge, hull_edges, hull_faces, hull_plane
+from ..shapes import BOX, CAPSULE, CYLINDER, HULL, SPHERE, Shape, core_extent
+from .triangle import (Corners, allowed_at_edge, corners_of, edge_vectors,
                        is_allowed_at_corner, outward_vectors, seen_from_below, supporting_corner)
 
 FACE, FIRST_CORNER = -1, 3
@@ -38,9 +39,8 @@ SHALLOW = 1e-3
 class LimitedAxis(NamedTuple):
     """``distance``, m: the largest separation of all. ``allowed``: of those that the edges allow,
     along ``axis`` and between a and the ``feature`` of the triangle; ``face``: along the
-    ``normal``, which points to the side of a's center; ``edges``: of that side. ``beyond``: the
-    largest from edges and corners at which the surface of a hull bends. All are of a's core,
-    without the radius of a sphere or capsule.
+    ``normal``, which points to the side of a's center; ``edges``: of that side. All are of a's
+    core, without the radius of a sphere or capsule.
     """
 
     distance: float
@@ -50,13 +50,12 @@ class LimitedAxis(NamedTuple):
     face: float
     normal: Vec3
     edges: Vec3
-    beyond: float
 
 
 @compiled
 def core_separation(a: Shape, corners: Corners, c: Vec3, d: Vec3) -> float:
     """Separation s(d), m, of a's core at ``c``, m, from the triangle's centroid."""
-    half = 0.0 if a.kind == SPHERE else core_extent(a, d)
+    half = 0.0 if a.kind == SPHERE else core_extent(a, neg(d))
     return dot(c, d) - half - max(dot(corners[0], d), dot(corners[1], d), dot(corners[2], d))
 
 
@@ -69,9 +68,11 @@ def core_radius(a: Shape) -> float:
 @compiled
 def edge_direction(a: Shape, c: Vec3, corner: Vec3, edge: Vec3, turn: int) -> Vec3:
     """Candidate number ``turn`` between an edge of the triangle and a's core, perpendicular to the
-    edge, of any length: across it and an edge or the axis of a, and of all but boxes towards the
-    ends of the axis.
+    edge, of any length: across it and an edge or the axis of a, and of all but boxes and hulls
+    towards the ends of the axis.
     """
+    if a.kind == HULL:
+        return cross(edge, to_world(a.rotation, hull_edge(a.system, a.hull, turn)))
     if a.kind == BOX:
         return cross(edge, column(a.rotation, turn))
     u = column(a.rotation, 2)
@@ -112,13 +113,11 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
         normal, edges = neg(normal), seen_from_below(edges)
     face = core_separation(a, corners, c, normal)
     distance = allowed = face
-    axis, feature, beyond = normal, FACE, -math.inf
+    axis, feature = normal, FACE
+    turns = hull_edges(a.system, a.hull) if a.kind == HULL else 3
     for k in range(3):
-        found = core_separation(a, corners, c, outward[k])
-        distance, bends = max(distance, found), t.is_of_hull and abs(edges[k]) > FLAT
-        if bends and found > beyond:
-            beyond = found
-        for turn in range(3):
+        distance = max(distance, core_separation(a, corners, c, outward[k]))
+        for turn in range(turns):
             if a.kind == SPHERE and turn != 1:
                 continue
             d = edge_direction(a, c, corners[k], directions[k], turn)
@@ -129,14 +128,15 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
             d = neg(d) if dot(d, c) < 0 else d
             found = core_separation(a, corners, c, d)
             distance = max(distance, found)
-            if bends and found > beyond:
-                beyond = found
             limited = allowed_at_edge(d, normal, outward[k], edges[k])
             found = core_separation(a, corners, c, limited)
             if found > allowed:
                 allowed, axis, feature = found, limited, k
-    for k in range(3):
-        if a.kind <= CAPSULE or (a.kind == CYLINDER and k < 2):
+    first, end = hull_faces(a.system, a.hull) if a.kind == HULL else (0, 3)
+    for k in range(first, end):
+        if a.kind == HULL:
+            d = neg(to_world(a.rotation, hull_plane(a.system, k)[0]))
+        elif a.kind <= CAPSULE or (a.kind == CYLINDER and k < 2):
             d = corner_direction(a, c, corners[k])
         else:
             d = column(a.rotation, k)
@@ -144,15 +144,13 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
         if length < SHORTEST:
             continue
         d = divide(d, length)
-        d = neg(d) if dot(d, c) < 0 else d
+        if a.kind != HULL and dot(d, c) < 0:
+            d = neg(d)
         found, corner = core_separation(a, corners, c, d), supporting_corner(corners, d)
         distance = max(distance, found)
-        if t.is_of_hull and found > beyond and (
-                abs(edges[corner]) > FLAT and abs(edges[(corner + 2) % 3]) > FLAT):
-            beyond = found
         if found > allowed and is_allowed_from_a_side(d, normal, outward, edges, corner):
             allowed, axis, feature = found, d, FIRST_CORNER + corner
-    return LimitedAxis(distance, allowed, axis, feature, face, normal, edges, beyond)
+    return LimitedAxis(distance, allowed, axis, feature, face, normal, edges)
 
 
 @compiled
@@ -167,15 +165,12 @@ def is_beside(found: LimitedAxis, radius: float) -> bool:
 @compiled
 def triangle_separation(a: Shape, t: Shape) -> float:
     """Gap, m, of a shape and a triangle by the normals that its edges allow. Of what is beside it,
-    but near, this says how far it is from the triangle's plane, or from that of the next one; of
-    what is beyond a bend of a hull, which is closed, that it does not touch it.
+    but near, this says how far it is from the triangle's plane, or from that of the next one.
     """
     found, radius = limited_axis(a, t), core_radius(a)
     distance, gap = found.distance - radius, found.allowed - radius
     if is_beside(found, radius):
         return max(distance, -BARELY)
-    if found.beyond > radius:
-        return max(distance, gap)
     if distance > gap:
         share = min(max(distance / REACH, 0.0), 1.0)
         return max(gap, distance - REACH, BARELY * share * share + min(max(distance, -BARELY), 0.0))

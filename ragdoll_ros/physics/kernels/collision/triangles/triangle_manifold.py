@@ -13,11 +13,11 @@ from ...compiling.decorators import compiled
 from ...maths.vectors import (Vec3, add, add_scaled, column, dot, neg, put, scale, sub, vec)
 from ..clipping import MAX_CLIPPED, clip_polygon
 from ..convex_manifold import FACE_COSINE, MERGE_RATIO, clip_edges, closest_on_edges
-from ..features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, supporting_edge,
-                        supporting_face)
+from ..features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, face_normal,
+                        supporting_edge, supporting_face)
 from ..manifold import CLIP_VERTEX, merge_points, reduce_points, sort_points
 from ..separating_axis import FACE_BIAS, FACE_BIAS_RATIO
-from ..shapes import BOX, CAPSULE, SPHERE, Shape, bounding_radius
+from ..shapes import BOX, CAPSULE, HULL, SPHERE, Shape, bounding_radius
 from .limited_axis import FACE, FIRST_CORNER, LimitedAxis, core_radius, is_beside, limited_axis
 from .triangle import FLAT, Corners, corners_of, supporting_corner
 
@@ -27,10 +27,10 @@ WIDER = 1 + 1e-9
 IS_DISTANCE = 1e-7
 """m: an allowed separation that differs by less from the distance is between the nearest points."""
 
-ON_FACE = 8
+ON_FACE = 1 << 16
 """Feature ids of points on the triangle's face that are vertices of a: below this."""
 
-FACE_IDS, REFERENCE_IDS, CLOSEST_ID = 1024, 2048, 3072
+FACE_IDS, REFERENCE_IDS, CLOSEST_ID = ON_FACE, ON_FACE + 1024, ON_FACE + 2048
 """First feature ids of others on the triangle's face, and on a's face; the id of the closest."""
 
 
@@ -40,15 +40,15 @@ def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -
     found, radius = limited_axis(a, t), core_radius(a)
     if found.allowed - radius > margin or is_beside(found, radius):
         return 0
-    scratch = np.empty(2 * MAX_CLIPPED + MAX_CORNERS, CLIP_VERTEX)
+    scratch = np.empty(2 * MAX_CLIPPED + 2 * MAX_CORNERS, CLIP_VERTEX)
     points = scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
     corners, arm = corners_of(t), sub(a.position, t.position)
     s, n, feature = found.allowed, found.axis, found.feature
     if a.kind >= BOX and s < found.face + FACE_BIAS + FACE_BIAS_RATIO * abs(s):
         s, n, feature = found.face, found.normal, FACE
     if feature == FACE:
-        count, clipped = clip_by_triangle(a, arm, corners, found, t.is_of_hull != 0, scratch)
-    elif a.kind >= BOX and face_cosine(a, n) >= FACE_COSINE:
+        count, clipped = clip_by_triangle(a, arm, corners, found, scratch)
+    elif a.kind >= BOX and face_cosine(a, neg(n)) >= FACE_COSINE:
         count = clipped = clip_triangle(a, arm, corners, n, scratch)
     else:
         middle, u = a_edge(a, arm, n)
@@ -110,15 +110,16 @@ def put_corners(corners: Corners, factor: float, out: np.ndarray) -> None:
 
 
 @compiled
-def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis, is_of_hull: bool,
+def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
                      scratch: np.ndarray) -> tuple[int, int]:
     """Clip what of a's core supports against the triangle's normal by the triangle. Writes the
     points to ``scratch`` from MAX_CLIPPED on. Returns their number, and how many there were before
-    those were left out that the next triangle has: of the triangles of a hull's face that share a
-    corner, one has it.
+    those were left out that the next triangle has.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
-    sides, n, number, face = scratch[2 * MAX_CLIPPED:], found.normal, 0, 0
+    sides, names = (scratch[2 * MAX_CLIPPED:2 * MAX_CLIPPED + MAX_CORNERS],
+                    scratch[2 * MAX_CLIPPED + MAX_CORNERS:])
+    n, number, face = found.normal, 0, 0
     if a.kind <= CAPSULE:
         number, half = (1, 0.0) if a.kind == SPHERE else (2, a.size[1])
         for i in range(number):
@@ -127,23 +128,22 @@ def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis, 
         number, face = supporting_face(a, neg(n), (0.0, 0.0, 0.0), polygon)
     for i in range(number):
         put(polygon[i].point, add(vec(polygon[i].point), arm))
+        names[i].feature_id = polygon[i].feature_id
         polygon[i].feature_id = corner_id(a, face, i)
     put_corners(corners, WIDER, sides)
     number = clip_polygon(sides, 4, n, polygon, number, points)
     count = 0
     for i in range(number):
         vertex, before = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
-        has_next = goes_on(found.edges, before)
-        if is_of_hull and before >= MAX_CORNERS and vertex.feature_id >= MAX_CORNERS:
-            has_next = False
-        if has_next or goes_on(found.edges, vertex.feature_id):
+        if goes_on(found.edges, before) or goes_on(found.edges, vertex.feature_id):
             continue
         height = dot(n, vec(vertex.point))
         put(points[count].point, add_scaled(vec(vertex.point), -(height / 2), n))
         points[count].gap = height
         points[count].feature_id = FACE_IDS + before * 2 * MAX_CORNERS + vertex.feature_id
         if before < MAX_CORNERS and vertex.feature_id < MAX_CORNERS:
-            points[count].feature_id = vertex.feature_id
+            corner = vertex.feature_id
+            points[count].feature_id = names[corner].feature_id if a.kind == HULL else corner
         count += 1
     return count, number
 
@@ -162,15 +162,18 @@ def clip_triangle(a: Shape, arm: Vec3, corners: Corners, n: Vec3, scratch: np.nd
     points to ``scratch`` from MAX_CLIPPED on. Returns their number.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
-    sides = scratch[2 * MAX_CLIPPED:]
+    sides = scratch[2 * MAX_CLIPPED:2 * MAX_CLIPPED + MAX_CORNERS]
     put_corners(corners, 1.0, polygon)
     nearest = sub(corners[supporting_corner(corners, n)], arm)
     number, face = supporting_face(a, neg(n), nearest, sides)
+    if number % 2:
+        sides[number] = sides[number - 1]
+        number += 1
     for i in range(number):
         put(sides[i].point, add(vec(sides[i].point), arm))
     origin = vec(sides[0].point)
     number = clip_polygon(sides, number, n, polygon, 3, points)
-    normal = column(a.rotation, face // 2 if a.kind == BOX else 2)
+    normal = face_normal(a, face)
     cosine = dot(normal, n)
     for i in range(number):
         vertex, before = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id

@@ -1,0 +1,86 @@
+"""Tables of convex hulls, as the kernels read them."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ....model.mesh import Hull
+from ....model.pose import Pose
+from ...kernels.collision.shapes import HULL
+from ...kernels.system import GEOM, HULL_FACE, HULL_TABLE
+
+ONE_PLANE = 1e-9
+"""Difference of normals, and of distances over the hull's size, up to which faces are one."""
+
+
+class HullTables(NamedTuple):
+    """Fields of a System of the same names: vertices (k, 3) m, HULL_FACE (t,), HULL_TABLE (h,)."""
+
+    vertices: np.ndarray
+    hull_faces: np.ndarray
+    hulls: np.ndarray
+
+
+NO_HULLS = HullTables(np.zeros((0, 3)), np.zeros(0, HULL_FACE), np.zeros(0, HULL_TABLE))
+
+
+def hull_tables(hull: Hull) -> HullTables:
+    """Those of one hull, about its centroid."""
+    triangles = hull.triangles
+    corners = triangles.corners - hull.centroid
+    vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    order = np.lexsort(vertices.T)
+    faces = np.zeros(len(corners), HULL_FACE)
+    faces['corners'] = np.argsort(order)[place.reshape(-1, 3)]
+    faces['normal'] = triangles.normals
+    # The farthest of a triangle's corners, so that no part of the hull is outside.
+    faces['offset'] = np.einsum('ti,tki->tk', triangles.normals, corners).max(axis=1)
+    radius = np.linalg.norm(vertices, axis=1).max()
+    faces, count = _by_faces(faces, radius)
+    table = np.zeros(1, HULL_TABLE)
+    table['vertex_count'], table['face_count'] = len(vertices), count
+    table['triangle_count'], table['size'] = len(faces), radius
+    return HullTables(vertices[order], faces, table)
+
+
+def hull_geom(hull: Hull, pose: Pose) -> np.ndarray:
+    """GEOM (1,) of a hull at a pose, but for its body."""
+    geom = np.zeros(1, GEOM)
+    radius = np.linalg.norm(hull.vertices - hull.centroid, axis=1).max()
+    geom['kind'], geom['size'] = HULL, (radius, 0, 0)
+    geom['position'], geom['orientation'] = pose.apply(np.array(hull.centroid)), pose.orientation
+    geom['bounding_radius'] = radius
+    geom['reach'] = np.linalg.norm(pose.apply(hull.vertices), axis=1).max()
+    return geom
+
+
+def join_hulls(parts: Sequence[HullTables]) -> HullTables:
+    """Concatenate tables: the hulls of each follow those of the one before."""
+    vertices = faces = 0
+    moved = []
+    for part in parts:
+        table = part.hulls.copy()
+        table['first_vertex'] += vertices
+        table['first_face'] += faces
+        moved.append(table)
+        vertices, faces = vertices + len(part.vertices), faces + len(part.hull_faces)
+    return HullTables(np.concatenate([part.vertices for part in parts]),
+                      np.concatenate([part.hull_faces for part in parts]), np.concatenate(moved))
+
+
+def _by_faces(faces: np.ndarray, size: float) -> tuple[np.ndarray, int]:
+    """Triangles (t,), HULL_FACE, in another order: first one of each flat face, then the others,
+    which get its plane; and the number of faces.
+    """
+    planes = np.column_stack([faces['normal'], faces['offset'] / size])
+    left, firsts, others = np.arange(len(planes)), [], []
+    while len(left):
+        same = np.abs(planes[left] - planes[left[0]]).max(axis=1) < ONE_PLANE
+        firsts.append(left[0])
+        others.append(left[same][1:])
+        for name in ('normal', 'offset'):
+            faces[name][left[same]] = faces[name][left[0]]
+        left = left[~same]
+    return faces[np.concatenate([np.array(firsts), *others])], len(firsts)

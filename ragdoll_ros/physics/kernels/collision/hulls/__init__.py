@@ -1,0 +1,1 @@
+"""Convex hulls: support function, distance and faces of a polyhedron."""

@@ -1,0 +1,190 @@
+"""A convex polyhedron: its support function, the distance of a point, and its features.
+
+All is in the hull's frame, whose origin, the centroid, is inside. A hull is found by the address of
+its System, whose tables have it, and its index there: see HULL_TABLE of system.py.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...compiling.decorators import compiled
+from ...maths.vectors import (Vec3, add, add_scaled, cross, divide, dot, norm, put, scale, sub, vec)
+from ...system import System, system_at
+
+DIRECTIONS = np.array([(math.cos(angle), math.sin(angle))
+                       for angle in (0.3 + k * math.pi / 4 for k in range(8))])
+"""Those corners of a face are taken that are farthest along these, in its plane. They are turned
+against its first edge, so that the corners of a rectangle do not tie."""
+
+ON_PLANE = 1e-6
+"""Of the hull's size: how far a corner of a face may be from its plane, as model.mesh.CONVEX."""
+
+FEATURE_SINE = 0.1
+"""Sine of the angle up to which an edge is perpendicular to n."""
+
+INSIDE = 1e-12
+"""m: a point that is nearer to an edge or corner has the normal of a face there."""
+
+
+@compiled
+def hull_support(system: int, hull: int, d: Vec3) -> Vec3:
+    """The vertex, m, that is farthest along d."""
+    s = system_at(system)
+    return vec(s.vertices[supporting_vertex(s, hull, d)])
+
+
+@compiled
+def supporting_vertex(s: System, hull: int, d: Vec3) -> int:
+    """Index in System.vertices of the vertex that is farthest along d."""
+    first, best, most = s.hulls[hull].first_vertex, s.hulls[hull].first_vertex, -math.inf
+    for i in range(first, first + s.hulls[hull].vertex_count):
+        found = dot(vec(s.vertices[i]), d)
+        if found > most:
+            most, best = found, i
+    return best
+
+
+@compiled
+def hull_edges(system: int, hull: int) -> int:
+    """Number of a hull's edges, each counted once from either side."""
+    return 3 * system_at(system).hulls[hull].triangle_count
+
+
+@compiled
+def hull_edge(system: int, hull: int, k: int) -> Vec3:
+    """Edge k of hull_edges(), m; 0 on the side of it that does not count."""
+    s = system_at(system)
+    table = s.hulls[hull]
+    corners = s.hull_faces[table.first_face + k // 3].corners
+    i, j = corners[k % 3], corners[(k + 1) % 3]
+    if i > j:
+        return 0.0, 0.0, 0.0
+    return sub(vec(s.vertices[table.first_vertex + j]), vec(s.vertices[table.first_vertex + i]))
+
+
+@compiled
+def hull_distance(system: int, hull: int, p: Vec3) -> tuple[float, Vec3]:
+    """Signed distance, m, of a point from the surface, and its gradient: inside, that from the
+    plane of the nearest face.
+    """
+    s = system_at(system)
+    first = s.hulls[hull].first_face
+    depth, inner = -math.inf, (0.0, 0.0, 1.0)
+    least, outer = math.inf, (0.0, 0.0, 1.0)
+    for i in range(first, first + s.hulls[hull].triangle_count):
+        normal = vec(s.hull_faces[i].normal)
+        height = dot(normal, p) - s.hull_faces[i].offset
+        if height > depth:
+            depth, inner = height, normal
+        if 0 < height < least:
+            found, n = _triangle_distance(
+                s, s.hulls[hull].first_vertex, i, p, normal, height)
+            if found < least:
+                least, outer = found, n
+    return (depth, inner) if depth <= 0 else (least, outer)
+
+
+@compiled
+def _triangle_distance(s: System, first: int, face: int, p: Vec3, normal: Vec3,
+                       height: float) -> tuple[float, Vec3]:
+    """Distance, m, of a point ``height`` above the plane of a triangle from it, and the direction.
+    ``first``: the hull's first vertex.
+    Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    """
+    least, nearest, is_inside = math.inf, p, True
+    corners = s.hull_faces[face].corners
+    for k in range(3):
+        a = vec(s.vertices[first + corners[k]])
+        edge = sub(vec(s.vertices[first + corners[(k + 1) % 3]]), a)
+        arm = sub(p, a)
+        if dot(cross(edge, normal), arm) <= 0:
+            continue
+        is_inside = False
+        t = min(max(dot(arm, edge) / dot(edge, edge), 0.0), 1.0)
+        arm = add_scaled(arm, -t, edge)
+        square = dot(arm, arm)
+        if square < least:
+            least, nearest = square, arm
+    if is_inside:
+        return height, normal
+    distance = math.sqrt(least)
+    return distance, divide(nearest, distance) if distance > INSIDE else normal
+
+
+@compiled
+def hull_faces(system: int, hull: int) -> tuple[int, int]:
+    """Index in System.hull_faces of a hull's first face, and that after its last."""
+    table = system_at(system).hulls[hull]
+    return table.first_face, table.first_face + table.face_count
+
+
+@compiled
+def nearest_face(system: int, hull: int, d: Vec3) -> int:
+    """Index in System.hull_faces of the face whose normal is nearest to d."""
+    s = system_at(system)
+    first, best, most = s.hulls[hull].first_face, s.hulls[hull].first_face, -math.inf
+    for i in range(first, first + s.hulls[hull].face_count):
+        found = dot(vec(s.hull_faces[i].normal), d)
+        if found > most:
+            most, best = found, i
+    return best
+
+
+@compiled
+def hull_plane(system: int, face: int) -> tuple[Vec3, float]:
+    """Unit normal n of a face of a hull, outwards, and offset d, m, of its plane n x = d."""
+    s = system_at(system)
+    return vec(s.hull_faces[face].normal), s.hull_faces[face].offset
+
+
+@compiled
+def face_polygon(system: int, hull: int, face: int, corners: np.ndarray) -> int:
+    """Write at most 8 corners of a face, those farthest along eight directions, anticlockwise from
+    outside, to ``corners`` of CLIP_VERTEX; their feature ids are indices of vertices in the hull.
+    Returns their number.
+    """
+    s = system_at(system)
+    first, count = s.hulls[hull].first_vertex, 0
+    triangle, normal = s.hull_faces[face], vec(s.hull_faces[face].normal)
+    x = sub(vec(s.vertices[first + triangle.corners[1]]),
+            vec(s.vertices[first + triangle.corners[0]]))
+    x = divide(x, norm(x))
+    y, bottom = cross(normal, x), triangle.offset - ON_PLANE * s.hulls[hull].size
+    for k in range(len(DIRECTIONS)):
+        d = add(scale(DIRECTIONS[k, 0], x), scale(DIRECTIONS[k, 1], y))
+        best, most = -1, -math.inf
+        for i in range(first, first + s.hulls[hull].vertex_count):
+            vertex = vec(s.vertices[i])
+            if dot(vertex, normal) < bottom:
+                continue
+            found = dot(vertex, d)
+            if found > most:
+                best, most = i - first, found
+        if count and (best == corners[count - 1].feature_id or best == corners[0].feature_id):
+            continue
+        put(corners[count].point, vec(s.vertices[first + best]))
+        corners[count].feature_id = best
+        count += 1
+    return count
+
+
+@compiled
+def supporting_hull_edge(system: int, hull: int, d: Vec3) -> tuple[Vec3, Vec3]:
+    """Middle, m, and half vector of the edge at the vertex farthest along d that is most nearly
+    perpendicular to d; the half is 0 where none is.
+    """
+    s = system_at(system)
+    top, begin = supporting_vertex(s, hull, d), s.hulls[hull].first_vertex
+    first, least, half = s.hulls[hull].first_face, FEATURE_SINE, (0.0, 0.0, 0.0)
+    corner = vec(s.vertices[top])
+    for i in range(first, first + s.hulls[hull].triangle_count):
+        for k in range(3):
+            if begin + s.hull_faces[i].corners[k] != top:
+                continue
+            edge = sub(vec(s.vertices[begin + s.hull_faces[i].corners[(k + 1) % 3]]), corner)
+            sine = abs(dot(edge, d)) / norm(edge)
+            if sine < least:
+                least, half = sine, scale(0.5, edge)
+    return add(corner, half), half
