@@ -15,11 +15,12 @@ from ragdoll_ros import (
     Cylinder,
     Follow,
     Ground,
+    HeightField,
     Hull,
+    Mesh,
     Placement,
     Plane,
     Ragdoll,
-    RagdollError,
     Scene,
     Simulation,
     Sphere,
@@ -28,6 +29,7 @@ from ragdoll_ros import (
     load_scene,
     save_scene,
 )
+from ragdoll_ros.files.robots.mesh_file import convex_hull
 from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.compound import Compound
@@ -296,19 +298,104 @@ def test_several_hulls_make_one_body(tmp_path):
     assert to_urdf(scenes[1].dolls[-1].doll).count('<box ') == 4
 
 
-def test_hulls_that_would_pass_through_each_other_are_refused(tmp_path):
-    """By what else is in the scene; of driven ones nothing is."""
-    stone = body('stone', hull_of(), position=(0, 0, 1))
-    for other, told in ((body('robot', hull_of(), follow=Follow()), 'the hull of robot'),
-                        (body('brick', hull_of()), 'the hull of brick')):
-        with pytest.raises(RagdollError, match=f'stone, which has a hull.*{told}'):
-            world(stone, other)
-    for shape in (hull_of(), Compound((Part(hull_of()),))):
-        with pytest.raises(RagdollError, match='the surface of wall'):
-            world(stone, bodies=(StaticBody('wall', shape),))
-    driven = [body(name, hull_of(), follow=Follow()) for name in 'ab']
-    assert world(*driven, bodies=(StaticBody('wall', hull_of()),))
+def test_a_robot_that_moves_has_no_triangles_of_their_own(tmp_path, arm):
     entry = ENTRY.replace('meshes: hull', 'meshes: exact')
-    pytest.importorskip('trimesh')
     (tmp_path / 'link.stl').write_bytes(stl(np.eye(3)[None]))
     assert '`meshes: hull` or `box`: no other moves' in refusal(tmp_path, entry, r_urdf=ARM)
+
+
+def stone(seed, count=14, size=0.15):
+    """A convex stone at its centre of mass and principal axes."""
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(count, 3))
+    points *= size * rng.uniform(0.7, 1.2, 3) / np.linalg.norm(points, axis=1)[:, None]
+    whole = Compound((Part(convex_hull(points)),))
+    return whole.in_frame(whole.principal_pose())
+
+
+FLAT = Mesh([[-6, -6, 0], [6, -6, 0], [6, 6, 0], [-6, 6, 0]], [[0, 1, 2], [0, 2, 3]])
+ROWS, COLUMNS = np.mgrid[-3:3:25j, -3:3:25j]
+FLOORS = {'ground': {}, 'mesh': {'ground': None, 'bodies': (StaticBody('floor', FLAT),)},
+          'field': {'ground': None, 'bodies': (StaticBody(
+              'floor', HeightField(0.05 * np.sin(2 * ROWS) * np.cos(3 * COLUMNS), (6, 6))),)},
+          'hull': {'ground': None, 'bodies': (StaticBody(
+              'floor', hull_of((12, 12, 1)), position=(0, 0, -0.5)),)}}
+
+
+@pytest.mark.parametrize('accuracy', ('draft', 'normal', 'exact'))
+@pytest.mark.parametrize('floor', ('mesh', 'hull'))
+def test_a_loose_hull_tumbles_on_surfaces_as_a_box_does(floor, accuracy):
+    """Over its first blow and tumble; on the mesh both meet the same triangles."""
+    start = {'position': (0.3, -0.4, 0.5), 'orientation': TURN, 'velocity': (1, 0.3, 0),
+             'spin': (1, 2, 0.5)}
+    hull, box = (run(world(body('stone', shape, 2.0, **start), **FLOORS[floor]), 0.6, accuracy)[0]
+                 for shape in (hull_of(), Box(SIZE)))
+    assert box[-1, 0, 2] < 0.3
+    np.testing.assert_allclose(hull[..., :3], box[..., :3], atol=APART[accuracy])
+
+
+@pytest.mark.parametrize('accuracy', ('draft', 'normal', 'exact'))
+def test_a_hull_hits_a_hull_as_a_box_does_a_box(accuracy):
+    """In the air, at a corner; momentum and angular momentum stay to rounding of the solve."""
+    (hulls, excess, _), (boxes, _, _) = (run(world(
+        body('a', shape, 1.0, position=(0, 0, 0), orientation=TURN),
+        body('b', shape, 2.0, position=(-1, 0.1, 0.12), velocity=(3, 0, 0), spin=(0.5, 1, 2)),
+        ground=None), 0.6, accuracy) for shape in (hull_of(), Box(SIZE)))
+    assert boxes[-1, 0, 7] > 1
+    np.testing.assert_allclose(hulls[..., :3], boxes[..., :3], atol=APART[accuracy])
+    momentum = hulls[:, 0, 7:10] + 2 * hulls[:, 1, 7:10]
+    np.testing.assert_allclose(momentum[:, :2], np.tile((6, 0), (len(hulls), 1)), atol=1e-10)
+    assert excess < 1e-6
+
+
+@pytest.mark.parametrize('count', (1, 2, 3, 5, 6, 8, 12, 40))
+def test_a_stack_of_hulls_stands_as_high_as_its_bodies(count):
+    size = (0.3, 0.4, 0.1)
+    made = world(*(body(f'brick_{k}', hull_of(size), position=(0, 0, (k + 0.5) * size[2]))
+                   for k in range(count)))
+    rows, excess, _ = run(made, 0.5)
+    # What rests is at most 2 um in what it stands on: twice TOUCHING of the kernels.
+    np.testing.assert_allclose(rows[-1, :, 2], (np.arange(count) + 0.5) * size[2],
+                               atol=2e-6 * count)
+    np.testing.assert_allclose(rows[-1, :, :2], 0, atol=1e-6 * count)
+    assert excess < 1e-6
+
+
+@pytest.mark.parametrize('floor', FLOORS)
+@pytest.mark.parametrize('count', (1, 3, 8))
+def test_a_pile_of_stones_comes_to_rest_without_gaining_energy(count, floor):
+    rng = np.random.default_rng(count)
+    made = world(*(body(f'stone_{k}', stone(k), 2.0, orientation=rotation.from_rpy(
+        *rng.normal(size=3)), position=(*(0.1 * rng.normal(size=2)), 0.4 + 0.4 * k))
+        for k in range(count)), **FLOORS[floor])
+    with Simulation(made) as simulation:
+        simulation.run(round(5 / simulation.step))
+        state = simulation.state
+        assert simulation.energy_excess < 1e-6
+        assert simulation.asleep
+    # The lowest point of the waves is at -0.05 m; the smallest stone is 0.05 m thick.
+    assert state.positions[:, 2].min() > (-0.03 if floor == 'field' else 0.02)
+
+
+@pytest.mark.parametrize('accuracy', ('draft', 'normal', 'exact'))
+@pytest.mark.parametrize('floor', ('mesh', 'hull'))
+def test_no_hull_passes_a_surface_at_20_m_s(floor, accuracy):
+    """A triangle has no thickness; the plate is 1 cm thick."""
+    bodies = FLOORS['mesh']['bodies'] if floor == 'mesh' else (StaticBody(
+        'plate', hull_of((6, 6, 0.01))),)
+    made = world(body('stone', stone(3), 2.0, position=(0.1, 0.2, 1), velocity=(1, 0, -20),
+                      spin=(3, -8, 2)), ground=None, bodies=bodies)
+    rows, _, _ = run(made, 0.3, accuracy)
+    assert rows[-1, 0, 9] > 0 and rows[:, 0, 2].min() > 0.04
+
+
+def test_what_begins_within_a_hull_is_told_and_comes_out():
+    """By the shortest way, up, slowly: it gains no more than the height."""
+    made = world(body('stone', hull_of(), position=(0, 0, 0.58)),
+                 bodies=(StaticBody('table', hull_of((2, 2, 0.5)), position=(0, 0, 0.25)),))
+    with Simulation(made) as simulation:
+        overlap, = simulation.initial_overlaps
+        assert overlap.depth == pytest.approx(0.07, abs=1e-6)
+        simulation.run(200)
+        assert simulation.state.positions[0] == pytest.approx((0, 0, 0.65), abs=2e-3)
+        assert simulation.energy_excess < 1.001 * 9.81 * 0.07

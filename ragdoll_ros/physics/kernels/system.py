@@ -30,15 +30,21 @@ has a gap of its own; see ground_point() of contact/gaps.py."""
 
 HULL_TABLE = np.dtype([
     ('first_vertex', np.int64), ('vertex_count', np.int64), ('first_face', np.int64),
-    ('face_count', np.int64), ('triangle_count', np.int64), ('size', float)], align=True)
+    ('face_count', np.int64), ('triangle_count', np.int64), ('first_edge', np.int64),
+    ('edge_count', np.int64), ('size', float)], align=True)
 """A convex hull: where its vertices are in System.vertices, m, in its geom's frame, whose origin is
 its centroid; where its triangles are in System.hull_faces, first one of each face, then those that
-lie in the planes of these; and its radius about the origin, m."""
+lie in the planes of these; where its edges are in System.hull_edges; and its radius about the
+origin, m."""
 
 HULL_FACE = np.dtype([('normal', float, 3), ('offset', float), ('corners', np.int64, 3)],
                      align=True)
 """A triangle of a hull: unit normal n, outwards, and offset d, m, of its plane n x = d, equal for
 all triangles of a flat face; its corners, anticlockwise, counted from the hull's first vertex."""
+
+HULL_EDGE = np.dtype([('corners', np.int64, 2), ('inward', float, (2, 3))], align=True)
+"""An edge between two faces of a hull: its corners as those of HULL_FACE, and the unit vectors
+perpendicular to it in both faces, inwards."""
 
 JOINT_LIMIT = np.dtype([('q', np.int64), ('dof', np.int64), ('lower', float), ('upper', float)],
                        align=True)
@@ -55,7 +61,7 @@ along it, m, negative if the shapes overlap; an id that points of the same featu
 System = collections.namedtuple(
     'System', 'tree gravity dof_parent dof_body dof_damping body_last_dof body_root body_doll '
     'geoms pairs joint_limits ground_normal ground_offset restitution_speed doll_masses '
-    'energy_scale flight_enabled vertices hull_faces hulls')
+    'energy_scale flight_enabled vertices hull_faces hull_edges hulls')
 """A scene of n bodies, nv degrees of freedom and d dolls. ``tree`` (n,): the kinematic trees, see
 dynamics/body.py. ``gravity`` (3,) m/s^2. ``dof_parent`` (nv,): the next degree of freedom towards
 the root, -1 at its end; ``dof_body`` (nv,); ``dof_damping`` (nv,) N m s/rad. ``body_last_dof``
@@ -64,8 +70,8 @@ root; ``body_doll`` (n,). ``geoms``, static ones last; ``pairs`` (of geoms that 
 ``joint_limits``. ``ground_normal`` (3,), ``ground_offset`` (1,) m, -inf: no ground.
 ``restitution_speed`` (1,) m/s: slower impacts do not bounce. ``doll_masses`` (d,) kg.
 ``energy_scale`` (1,) J: m g L of the whole system, L the largest reach. ``flight_enabled`` (1,):
-whether joint damping allows explicit integration. ``vertices`` (k, 3) m, ``hull_faces`` and
-``hulls``: the convex hulls."""
+whether joint damping allows explicit integration. ``vertices`` (k, 3) m, ``hull_faces``,
+``hull_edges`` and ``hulls``: the convex hulls."""
 
 OVERLAPPING, JOINT_OUTSIDE_LIMITS, KINEMATIC = 1, 2, 4
 """Flags, why a pair is excluded from collision for now: its geoms overlap, as they did at the
@@ -116,7 +122,7 @@ def blank_system() -> System:
         joint_limits=np.zeros(1, JOINT_LIMIT), ground_normal=np.zeros(3), ground_offset=np.zeros(1),
         restitution_speed=np.zeros(1), doll_masses=np.zeros(1), energy_scale=np.zeros(1),
         flight_enabled=np.zeros(1), vertices=np.zeros((0, 3)), hull_faces=np.zeros(0, HULL_FACE),
-        hulls=np.zeros(0, HULL_TABLE))
+        hull_edges=np.zeros(0, HULL_EDGE), hulls=np.zeros(0, HULL_TABLE))
 
 
 SYSTEM = bundle_type(blank_system())

@@ -140,7 +140,7 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray, static_geoms: np.
     static_geoms = static_geoms.copy()
     static_geoms['hull'] += hulls
     whole['geoms'] = np.concatenate([whole['geoms'], static_geoms])
-    tables = join_hulls([*(HullTables(part.vertices, part.hull_faces, part.hulls)
+    tables = join_hulls([*(HullTables(*(getattr(part, name) for name in HullTables._fields))
                            for part in parts), static_hulls])
     return parts[0]._replace(
         **whole, **tables._asdict(), energy_scale=scale,

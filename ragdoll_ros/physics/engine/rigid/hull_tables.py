@@ -9,21 +9,25 @@ import numpy as np
 from ....model.mesh import Hull
 from ....model.pose import Pose
 from ...kernels.collision.shapes import HULL
-from ...kernels.system import GEOM, HULL_FACE, HULL_TABLE
+from ...kernels.system import GEOM, HULL_EDGE, HULL_FACE, HULL_TABLE
 
 ONE_PLANE = 1e-9
 """Difference of normals, and of distances over the hull's size, up to which faces are one."""
 
 
 class HullTables(NamedTuple):
-    """Fields of a System of the same names: vertices (k, 3) m, HULL_FACE (t,), HULL_TABLE (h,)."""
+    """Fields of a System of the same names: vertices (k, 3) m, HULL_FACE (t,), HULL_EDGE (e,) and
+    HULL_TABLE (h,).
+    """
 
     vertices: np.ndarray
     hull_faces: np.ndarray
+    hull_edges: np.ndarray
     hulls: np.ndarray
 
 
-NO_HULLS = HullTables(np.zeros((0, 3)), np.zeros(0, HULL_FACE), np.zeros(0, HULL_TABLE))
+NO_HULLS = HullTables(np.zeros((0, 3)), np.zeros(0, HULL_FACE), np.zeros(0, HULL_EDGE),
+                      np.zeros(0, HULL_TABLE))
 
 
 def hull_tables(hull: Hull) -> HullTables:
@@ -39,10 +43,12 @@ def hull_tables(hull: Hull) -> HullTables:
     faces['offset'] = np.einsum('ti,tki->tk', triangles.normals, corners).max(axis=1)
     radius = np.linalg.norm(vertices, axis=1).max()
     faces, count = _by_faces(faces, radius)
+    vertices = vertices[order]
+    edges = _edges(vertices, faces)
     table = np.zeros(1, HULL_TABLE)
     table['vertex_count'], table['face_count'] = len(vertices), count
-    table['triangle_count'], table['size'] = len(faces), radius
-    return HullTables(vertices[order], faces, table)
+    table['triangle_count'], table['edge_count'], table['size'] = len(faces), len(edges), radius
+    return HullTables(vertices, faces, edges, table)
 
 
 def hull_geom(hull: Hull, pose: Pose) -> np.ndarray:
@@ -58,16 +64,18 @@ def hull_geom(hull: Hull, pose: Pose) -> np.ndarray:
 
 def join_hulls(parts: Sequence[HullTables]) -> HullTables:
     """Concatenate tables: the hulls of each follow those of the one before."""
-    vertices = faces = 0
+    vertices = faces = edges = 0
     moved = []
     for part in parts:
         table = part.hulls.copy()
         table['first_vertex'] += vertices
         table['first_face'] += faces
+        table['first_edge'] += edges
         moved.append(table)
         vertices, faces = vertices + len(part.vertices), faces + len(part.hull_faces)
-    return HullTables(np.concatenate([part.vertices for part in parts]),
-                      np.concatenate([part.hull_faces for part in parts]), np.concatenate(moved))
+        edges += len(part.hull_edges)
+    return HullTables(*(np.concatenate(each) for each in zip(*(
+        part[:-1] for part in parts), strict=True)), np.concatenate(moved))
 
 
 def _by_faces(faces: np.ndarray, size: float) -> tuple[np.ndarray, int]:
@@ -84,3 +92,21 @@ def _by_faces(faces: np.ndarray, size: float) -> tuple[np.ndarray, int]:
             faces[name][left[same]] = faces[name][left[0]]
         left = left[~same]
     return faces[np.concatenate([np.array(firsts), *others])], len(firsts)
+
+
+def _edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """HULL_EDGE (e,) of those edges that have different faces on both sides."""
+    # From each corner to the next; a row of the triangle on one side, and of that on the other.
+    begin, end = faces['corners'].ravel(), np.roll(faces['corners'], -1, axis=1).ravel()
+    order, reverse = np.lexsort((end, begin)), np.lexsort((begin, end))
+    other = np.empty_like(order)
+    other[order] = reverse
+    face = np.arange(len(begin)) // 3
+    normals = faces['normal'][face]
+    bends = (begin < end) & (normals != normals[other]).any(axis=1)
+    edges = np.zeros(np.count_nonzero(bends), HULL_EDGE)
+    edges['corners'] = np.stack([begin, end], axis=1)[bends]
+    for side, (normal, sign) in enumerate(((normals, 1.0), (normals[other], -1.0))):
+        inward = sign * np.cross(normal, vertices[end] - vertices[begin])[bends]
+        edges['inward'][:, side] = inward / np.linalg.norm(inward, axis=1)[:, None]
+    return edges

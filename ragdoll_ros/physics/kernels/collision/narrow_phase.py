@@ -49,7 +49,7 @@ def separation(a: Shape, b: Shape, cutoff: float) -> float:
     Overlapping shapes: minus the penetration depth.
     """
     if b.kind == TRIANGLE:
-        return triangle_separation(a, b)
+        return triangle_separation(a, b, cutoff)
     if b.kind <= CAPSULE < a.kind:
         a, b = b, a
     if a.kind <= CAPSULE:

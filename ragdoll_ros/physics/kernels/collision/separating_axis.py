@@ -22,7 +22,7 @@ from ..compiling.decorators import compiled
 from ..maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, scale,
                              to_world)
 from .gjk import SIMPLEX_VERTEX, Direction, closest_direction
-from .hulls.polyhedron import hull_edge, hull_edges, hull_faces, hull_plane
+from .hulls.polyhedron import edge_vector, hull_edges, hull_faces, hull_plane
 from .shapes import BOX, CAPSULE, CYLINDER, HULL, Shape, bounding_radius, core_extent
 
 PARALLEL_SINE = 1e-8
@@ -109,33 +109,35 @@ def _hull_edge_axis(a: Shape, b: Shape, c: Vec3, best: Axis) -> Axis:
     """
     if best[0] > -DEEP_RATIO * min(bounding_radius(a), bounding_radius(b)):
         return best
-    for i in range(_edge_count(a)):
-        for j in range(_edge_count(b)):
+    (first_a, end_a), (first_b, end_b) = _edges(a), _edges(b)
+    for i in range(first_a, end_a):
+        for j in range(first_b, end_b):
             n = cross(_edge(a, i), _edge(b, j))
             length = norm(n)
             if length < PARALLEL_SINE:
                 continue
-            n = _towards(c, divide(n, length))
-            found = separation_along(a, b, c, n)
-            if found > best[0]:
-                best = found, n
+            for side in range(2):
+                n = divide(n, length) if side == 0 else neg(n)
+                found = separation_along(a, b, c, n)
+                if found > best[0]:
+                    best = found, n
     return best
 
 
 @compiled
-def _edge_count(shape: Shape) -> int:
-    """Number of directions of edges: of a cylinder or a capsule its axis."""
+def _edges(shape: Shape) -> tuple[int, int]:
+    """First of the directions of edges, and after the last: of a cylinder or a capsule its axis."""
     if shape.kind == HULL:
         return hull_edges(shape.system, shape.hull)
-    return 3 if shape.kind == BOX else 1
+    return (0 if shape.kind == BOX else 2), 3
 
 
 @compiled
 def _edge(shape: Shape, k: int) -> Vec3:
     """Direction k of an edge, world, of any length."""
     if shape.kind == HULL:
-        return to_world(shape.rotation, hull_edge(shape.system, shape.hull, k))
-    return column(shape.rotation, k if shape.kind == BOX else 2)
+        return to_world(shape.rotation, edge_vector(shape.system, shape.hull, k))
+    return column(shape.rotation, k)
 
 
 @compiled

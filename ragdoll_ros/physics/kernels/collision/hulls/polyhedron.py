@@ -24,6 +24,9 @@ ON_PLANE = 1e-6
 FEATURE_SINE = 0.1
 """Sine of the angle up to which an edge is perpendicular to n."""
 
+ROUNDING = 1e-9
+"""Sine of the angle that a face may rise by beside an edge that supports."""
+
 INSIDE = 1e-12
 """m: a point that is nearer to an edge or corner has the normal of a face there."""
 
@@ -47,21 +50,25 @@ def supporting_vertex(s: System, hull: int, d: Vec3) -> int:
 
 
 @compiled
-def hull_edges(system: int, hull: int) -> int:
-    """Number of a hull's edges, each counted once from either side."""
-    return 3 * system_at(system).hulls[hull].triangle_count
+def hull_edges(system: int, hull: int) -> tuple[int, int]:
+    """Index in System.hull_edges of a hull's first edge, and that after its last."""
+    table = system_at(system).hulls[hull]
+    return table.first_edge, table.first_edge + table.edge_count
 
 
 @compiled
-def hull_edge(system: int, hull: int, k: int) -> Vec3:
-    """Edge k of hull_edges(), m; 0 on the side of it that does not count."""
+def edge_vector(system: int, hull: int, edge: int) -> Vec3:
+    """From one corner of an edge to the other, m."""
     s = system_at(system)
-    table = s.hulls[hull]
-    corners = s.hull_faces[table.first_face + k // 3].corners
-    i, j = corners[k % 3], corners[(k + 1) % 3]
-    if i > j:
-        return 0.0, 0.0, 0.0
-    return sub(vec(s.vertices[table.first_vertex + j]), vec(s.vertices[table.first_vertex + i]))
+    first, corners = s.hulls[hull].first_vertex, s.hull_edges[edge].corners
+    return sub(vec(s.vertices[first + corners[1]]), vec(s.vertices[first + corners[0]]))
+
+
+@compiled
+def is_supporting_edge(system: int, edge: int, d: Vec3) -> bool:
+    """Whether no point is farther along d, a unit vector perpendicular to an edge, than it is."""
+    inward = system_at(system).hull_edges[edge].inward
+    return dot(vec(inward[0]), d) <= ROUNDING and dot(vec(inward[1]), d) <= ROUNDING
 
 
 @compiled
@@ -177,13 +184,13 @@ def supporting_hull_edge(system: int, hull: int, d: Vec3) -> tuple[Vec3, Vec3]:
     """
     s = system_at(system)
     top, begin = supporting_vertex(s, hull, d), s.hulls[hull].first_vertex
-    first, least, half = s.hulls[hull].first_face, FEATURE_SINE, (0.0, 0.0, 0.0)
-    corner = vec(s.vertices[top])
-    for i in range(first, first + s.hulls[hull].triangle_count):
-        for k in range(3):
-            if begin + s.hull_faces[i].corners[k] != top:
+    least, half, corner = FEATURE_SINE, (0.0, 0.0, 0.0), vec(s.vertices[top])
+    first, end = hull_edges(system, hull)
+    for i in range(first, end):
+        for k in range(2):
+            if begin + s.hull_edges[i].corners[k] != top:
                 continue
-            edge = sub(vec(s.vertices[begin + s.hull_faces[i].corners[(k + 1) % 3]]), corner)
+            edge = sub(vec(s.vertices[begin + s.hull_edges[i].corners[1 - k]]), corner)
             sine = abs(dot(edge, d)) / norm(edge)
             if sine < least:
                 least, half = sine, scale(0.5, edge)

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from ...compiling.decorators import compiled
 from ...maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, sub,
-                               to_world)
-from ..hulls.polyhedron import hull_edge, hull_edges, hull_faces, hull_plane
+                               to_local, to_world)
+from ..hulls.polyhedron import (edge_vector, hull_edges, hull_faces, hull_plane,
+                                is_supporting_edge)
 from ..shapes import BOX, CAPSULE, CYLINDER, HULL, SPHERE, Shape, core_extent
 from .triangle import (Corners, allowed_at_edge, corners_of, edge_vectors,
                        is_allowed_at_corner, outward_vectors, seen_from_below, supporting_corner)
@@ -66,13 +67,26 @@ def core_radius(a: Shape) -> float:
 
 
 @compiled
+def hull_bounds(a: Shape, t: Shape) -> tuple[float, float]:
+    """How far, m, a hull is from the plane of a triangle, on the side of its center; and from the
+    triangle in its plane.
+    """
+    corners, c, normal = corners_of(t), sub(a.position, t.position), column(t.rotation, 2)
+    outward = outward_vectors(edge_vectors(corners), normal)
+    beside = max(core_separation(a, corners, c, outward[0]),
+                 core_separation(a, corners, c, outward[1]),
+                 core_separation(a, corners, c, outward[2]))
+    return core_separation(a, corners, c, neg(normal) if dot(normal, c) < 0 else normal), beside
+
+
+@compiled
 def edge_direction(a: Shape, c: Vec3, corner: Vec3, edge: Vec3, turn: int) -> Vec3:
     """Candidate number ``turn`` between an edge of the triangle and a's core, perpendicular to the
     edge, of any length: across it and an edge or the axis of a, and of all but boxes and hulls
     towards the ends of the axis.
     """
     if a.kind == HULL:
-        return cross(edge, to_world(a.rotation, hull_edge(a.system, a.hull, turn)))
+        return cross(edge, to_world(a.rotation, edge_vector(a.system, a.hull, turn)))
     if a.kind == BOX:
         return cross(edge, column(a.rotation, turn))
     u = column(a.rotation, 2)
@@ -114,10 +128,10 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
     face = core_separation(a, corners, c, normal)
     distance = allowed = face
     axis, feature = normal, FACE
-    turns = hull_edges(a.system, a.hull) if a.kind == HULL else 3
+    first_turn, end_turn = hull_edges(a.system, a.hull) if a.kind == HULL else (0, 3)
     for k in range(3):
         distance = max(distance, core_separation(a, corners, c, outward[k]))
-        for turn in range(turns):
+        for turn in range(first_turn, end_turn):
             if a.kind == SPHERE and turn != 1:
                 continue
             d = edge_direction(a, c, corners[k], directions[k], turn)
@@ -126,6 +140,9 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
                 continue
             d = divide(d, length)
             d = neg(d) if dot(d, c) < 0 else d
+            if a.kind == HULL and not is_supporting_edge(
+                    a.system, turn, neg(to_local(a.rotation, d))):
+                continue
             found = core_separation(a, corners, c, d)
             distance = max(distance, found)
             limited = allowed_at_edge(d, normal, outward[k], edges[k])
@@ -163,10 +180,15 @@ def is_beside(found: LimitedAxis, radius: float) -> bool:
 
 
 @compiled
-def triangle_separation(a: Shape, t: Shape) -> float:
+def triangle_separation(a: Shape, t: Shape, cutoff: float) -> float:
     """Gap, m, of a shape and a triangle by the normals that its edges allow. Of what is beside it,
-    but near, this says how far it is from the triangle's plane, or from that of the next one.
+    but near, this says how far it is from the triangle's plane, or from that of the next one. Of a
+    hull that is farther away than ``cutoff``, m, a lower bound.
     """
+    if a.kind == HULL:
+        height, beside = hull_bounds(a, t)
+        if max(height, beside - REACH) > cutoff:
+            return max(height, beside - REACH)
     found, radius = limited_axis(a, t), core_radius(a)
     distance, gap = found.distance - radius, found.allowed - radius
     if is_beside(found, radius):

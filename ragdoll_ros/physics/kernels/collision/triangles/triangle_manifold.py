@@ -18,7 +18,8 @@ from ..features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, face_
 from ..manifold import CLIP_VERTEX, merge_points, reduce_points, sort_points
 from ..separating_axis import FACE_BIAS, FACE_BIAS_RATIO
 from ..shapes import BOX, CAPSULE, HULL, SPHERE, Shape, bounding_radius
-from .limited_axis import FACE, FIRST_CORNER, LimitedAxis, core_radius, is_beside, limited_axis
+from .limited_axis import (FACE, FIRST_CORNER, LimitedAxis, core_radius, hull_bounds, is_beside,
+                           limited_axis)
 from .triangle import FLAT, Corners, corners_of, supporting_corner
 
 WIDER = 1 + 1e-9
@@ -37,6 +38,10 @@ FACE_IDS, REFERENCE_IDS, CLOSEST_ID = ON_FACE, ON_FACE + 1024, ON_FACE + 2048
 @compiled
 def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -> int:
     """Write the manifold of a shape and a triangle; arguments and return value as collide()."""
+    if a.kind == HULL:
+        height, beside = hull_bounds(a, t)
+        if max(height, beside) > margin:
+            return 0
     found, radius = limited_axis(a, t), core_radius(a)
     if found.allowed - radius > margin or is_beside(found, radius):
         return 0
