@@ -62,6 +62,18 @@ def test_a_slope_of_triangles_is_a_plane(shape, turn, tolerance, angle, accuracy
 
 
 @pytest.mark.parametrize('accuracy', ACCURACIES)
+@pytest.mark.parametrize('faces', [[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
+def test_what_is_larger_than_a_flat_face_stands_on_all_its_corners(faces, accuracy):
+    """Those at both ends of the diagonal too, which two triangles have: over any of the corners."""
+    square = Mesh([[-.2, -.2, 0], [.2, -.2, 0], [.2, .2, 0], [-.2, .2, 0]], faces)
+    table = StaticBody('table', square)
+    for x, y in ((0, 0), (.15, .15), (-.15, .15), (.15, -.15), (-.15, -.15)):
+        board = loose(Box((1, 1, 0.1)), position=(x, y, 0.05))
+        on_table, _ = states(scene(board, [table], restitution=0.0), 0.5, accuracy)
+        np.testing.assert_allclose(on_table[-1, 0, :3], (x, y, 0.05), atol=2e-6)
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES)
 @pytest.mark.parametrize('shape', [Sphere(0.1), BOX, Capsule(0.1, 0.3), Cylinder(0.1, 0.2)])
 def test_what_falls_on_flat_triangles_rests_at_its_height(shape, accuracy):
     start = loose(shape, position=(0.013, 0.0537, 0.5), velocity=(0.3, 0.1, 0),

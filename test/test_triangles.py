@@ -5,6 +5,7 @@ import numba
 import numpy as np
 import pytest
 from scipy.optimize import minimize
+from test_collision import HULLS, ROWS, TABLES
 
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.mesh import Mesh
@@ -15,14 +16,23 @@ from ragdoll_ros.physics.kernels.collision.shapes import (
     BOX,
     CAPSULE,
     CYLINDER,
+    HULL,
     SPHERE,
     TRIANGLE,
     Shape,
 )
 from ragdoll_ros.physics.kernels.system import CONTACT_POINT, MAX_MANIFOLD_POINTS
 
+STONE = 3
+"""Of HULLS, one of 14 vertices."""
+
+VERTICES = HULLS[STONE].vertices - HULLS[STONE].centroid
 SIZES = {SPHERE: (0.2, 0.0, 0.0), CAPSULE: (0.1, 0.3, 0.0), BOX: (0.2, 0.3, 0.1),
-         CYLINDER: (0.2, 0.3, 0.0)}
+         CYLINDER: (0.2, 0.3, 0.0), HULL: (float(TABLES.hulls['size'][STONE]), 0.0, 0.0)}
+
+
+FACES = slice(TABLES.hulls['first_face'][STONE],
+              TABLES.hulls['first_face'][STONE] + TABLES.hulls['face_count'][STONE])
 
 
 @numba.njit(error_model='numpy')
@@ -31,7 +41,8 @@ def measure(a, b, margin, out):
 
 
 def placed(kind, position, turn):
-    return Shape(kind, SIZES[kind], tuple(map(float, position)), rotation.matrix(turn))
+    return Shape(kind, SIZES[kind], tuple(map(float, position)), rotation.matrix(turn),
+                 (0.0, 0.0, 0.0), int(ROWS[0].ctypes.data), STONE)
 
 
 def geoms(vertices, faces, pose=None):
@@ -45,8 +56,9 @@ def geoms(vertices, faces, pose=None):
 def least_distance(shape, corners):
     """Distance, m, of a shape from a triangle, by sequential quadratic programming."""
     size, best = shape.size, np.inf
-    count = {SPHERE: 0, CAPSULE: 1, BOX: 3, CYLINDER: 3}[shape.kind]
-    box = {SPHERE: [], CAPSULE: [size[1]], BOX: list(size), CYLINDER: [size[0], size[0], size[1]]}
+    count = {SPHERE: 0, CAPSULE: 1, BOX: 3, CYLINDER: 3, HULL: 3}[shape.kind]
+    box = {SPHERE: [], CAPSULE: [size[1]], BOX: list(size), CYLINDER: [size[0], size[0], size[1]],
+           HULL: [size[0]] * 3}
 
     def point(x):
         local = np.zeros(3)
@@ -59,6 +71,10 @@ def least_distance(shape, corners):
     limits = [{'type': 'ineq', 'fun': lambda x: 1 - x[0] - x[1]}]
     if shape.kind == CYLINDER:
         limits.append({'type': 'ineq', 'fun': lambda x: size[0] ** 2 - x[2] ** 2 - x[3] ** 2})
+    if shape.kind == HULL:
+        planes = TABLES.hull_faces[FACES]
+        limits.append({'type': 'ineq', 'fun': lambda x: (
+            planes['offset'] - planes['normal'] @ x[2:])})
     bounds = [(0, 1)] * 2 + [(-half, half) for half in box[shape.kind]]
     for start in np.random.default_rng(3).uniform(0, 0.3, (3, 2 + count)):
         found = minimize(square, start, method='SLSQP', bounds=bounds, constraints=limits,
@@ -69,9 +85,9 @@ def least_distance(shape, corners):
 
 @pytest.mark.parametrize('kind', SIZES)
 def test_the_gap_of_an_open_triangle_is_the_distance(kind):
-    """In random poses, apart. That of a box is its largest separation along an axis: above zero
-    where it is apart, and no more than the distance. The rim of a cylinder may be taken for 1 cm
-    nearer.
+    """In random poses, apart. That of a box or hull is its largest separation along an axis: above
+    zero where it is apart, and no more than the distance. The rim of a cylinder may be taken for 1
+    cm nearer.
     """
     early = 0.01 if kind == CYLINDER else 0.0
     random = np.random.default_rng(kind)
@@ -158,9 +174,10 @@ def pair_normal(triangle):
 
 
 def _support(kind, turn, normal):
-    """Extent, m, of a shape along a normal."""
+    """Extent, m, of a shape against a normal."""
     x, y, z = rotation.rotate(rotation.inverse(turn), normal)
     size = SIZES[kind]
     return {SPHERE: size[0], CAPSULE: size[0] + size[1] * abs(z),
             BOX: size[0] * abs(x) + size[1] * abs(y) + size[2] * abs(z),
-            CYLINDER: size[0] * np.hypot(x, y) + size[1] * abs(z)}[kind]
+            CYLINDER: size[0] * np.hypot(x, y) + size[1] * abs(z),
+            HULL: (VERTICES @ (-x, -y, -z)).max()}[kind]

@@ -39,8 +39,8 @@ def hull_tables(hull: Hull) -> HullTables:
     faces = np.zeros(len(corners), HULL_FACE)
     faces['corners'] = np.argsort(order)[place.reshape(-1, 3)]
     faces['normal'] = triangles.normals
-    # The farthest of a triangle's corners, so that no part of the hull is outside.
-    faces['offset'] = np.einsum('ti,tki->tk', triangles.normals, corners).max(axis=1)
+    # The support function, so that no vertex is outside.
+    faces['offset'] = [(vertices @ normal).max() for normal in triangles.normals]
     radius = np.linalg.norm(vertices, axis=1).max()
     faces, count = _by_faces(faces, radius)
     vertices = vertices[order]

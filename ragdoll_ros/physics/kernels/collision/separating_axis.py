@@ -20,9 +20,10 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, scale,
-                             to_world)
+                             to_local, to_world)
 from .gjk import SIMPLEX_VERTEX, Direction, closest_direction
-from .hulls.polyhedron import edge_vector, hull_edges, hull_faces, hull_plane
+from .hulls.polyhedron import (edge_vector, hull_edges, hull_faces, hull_plane,
+                               is_supporting_edge)
 from .shapes import BOX, CAPSULE, CYLINDER, HULL, Shape, bounding_radius, core_extent
 
 PARALLEL_SINE = 1e-8
@@ -76,10 +77,13 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
             first, end = hull_faces(shape.system, shape.hull)
         for k in range(first, end):
             if shape.kind == HULL:
-                n = scale(sign, to_world(shape.rotation, hull_plane(shape.system, k)[0]))
+                normal, offset = hull_plane(shape.system, k)
+                n = scale(sign, to_world(shape.rotation, normal))
+                found = dot(c, n) - offset - (
+                    core_extent(b, n) if body == 0 else core_extent(a, neg(n)))
             else:
                 n = _towards(c, column(shape.rotation, k))
-            found = separation_along(a, b, c, n)
+                found = separation_along(a, b, c, n)
             if found > s and found > bar:
                 s, axis = found, n
                 if s > cutoff:
@@ -118,10 +122,18 @@ def _hull_edge_axis(a: Shape, b: Shape, c: Vec3, best: Axis) -> Axis:
                 continue
             for side in range(2):
                 n = divide(n, length) if side == 0 else neg(n)
-                found = separation_along(a, b, c, n)
-                if found > best[0]:
-                    best = found, n
+                if _supports(a, i, neg(n)) and _supports(b, j, n):
+                    found = separation_along(a, b, c, n)
+                    if found > best[0]:
+                        best = found, n
     return best
+
+
+@compiled
+def _supports(shape: Shape, edge: int, n: Vec3) -> bool:
+    """Whether an edge of a hull, perpendicular to n, supports along n; of other shapes True."""
+    return shape.kind != HULL or is_supporting_edge(
+        shape.system, edge, to_local(shape.rotation, n))
 
 
 @compiled

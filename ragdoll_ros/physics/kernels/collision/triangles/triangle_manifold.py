@@ -119,7 +119,8 @@ def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
                      scratch: np.ndarray) -> tuple[int, int]:
     """Clip what of a's core supports against the triangle's normal by the triangle. Writes the
     points to ``scratch`` from MAX_CLIPPED on. Returns their number, and how many there were before
-    those were left out that the next triangle has.
+    those were left out that the next triangle has: of the triangles of a flat face that share its
+    corner, one has it.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
     sides, names = (scratch[2 * MAX_CLIPPED:2 * MAX_CLIPPED + MAX_CORNERS],
@@ -140,7 +141,9 @@ def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
     count = 0
     for i in range(number):
         vertex, before = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
-        if goes_on(found.edges, before) or goes_on(found.edges, vertex.feature_id):
+        is_corner = before >= MAX_CORNERS and vertex.feature_id >= MAX_CORNERS
+        if goes_on(found.edges, vertex.feature_id) or (
+                goes_on(found.edges, before) and not is_corner):
             continue
         height = dot(n, vec(vertex.point))
         put(points[count].point, add_scaled(vec(vertex.point), -(height / 2), n))
