@@ -19,12 +19,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, scale,
-                             to_local, to_world)
+from ..maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, to_local,
+                             to_world)
 from .gjk import SIMPLEX_VERTEX, Direction, closest_direction
 from .hulls.polyhedron import (edge_vector, hull_edges, hull_faces, hull_plane,
                                is_supporting_edge)
-from .shapes import BOX, CAPSULE, CYLINDER, HULL, Shape, bounding_radius, core_extent
+from .shapes import BOX, CAPSULE, CYLINDER, HULL, Shape, bounding_radius, core_extent, half_width
 
 PARALLEL_SINE = 1e-8
 """Sine between two edges below which face normals replace their cross product."""
@@ -66,31 +66,22 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
     The axis of a capsule a counts as an edge. A ``bias`` of 1, not 0, prefers a's faces to b's and
     these to edges. The first axis with a separation above ``cutoff`` ends the search.
     """
+    if a.kind == HULL or b.kind == HULL:
+        return _hull_axis(a, b, c, bias, cutoff)
     s, axis = -MAX_PENETRATION, (0.0, 0.0, 0.0)
     first_a, first_b = 0 if a.kind == BOX else 2, 0 if b.kind == BOX else 2
     faces_a = 3 if a.kind == CAPSULE else first_a
     bar = -MAX_PENETRATION
     for body in range(2):
-        shape, sign = (a, -1.0) if body == 0 else (b, 1.0)
-        first, end = faces_a if body == 0 else first_b, 3
-        if shape.kind == HULL:
-            first, end = hull_faces(shape.system, shape.hull)
-        for k in range(first, end):
-            if shape.kind == HULL:
-                normal, offset = hull_plane(shape.system, k)
-                n = scale(sign, to_world(shape.rotation, normal))
-                found = dot(c, n) - offset - (
-                    core_extent(b, n) if body == 0 else core_extent(a, neg(n)))
-            else:
-                n = _towards(c, column(shape.rotation, k))
-                found = separation_along(a, b, c, n)
+        rotation = a.rotation if body == 0 else b.rotation
+        for k in range(faces_a if body == 0 else first_b, 3):
+            n = _towards(c, column(rotation, k))
+            found = dot(c, n) - half_width(a, n) - half_width(b, n)
             if found > s and found > bar:
                 s, axis = found, n
                 if s > cutoff:
                     return s, axis
         bar = s + bias * (FACE_BIAS + FACE_BIAS_RATIO * abs(s))
-    if a.kind == HULL or b.kind == HULL:
-        return _hull_edge_axis(a, b, c, (s, axis))
     for i in range(first_a, 3):
         for j in range(first_b, 3):
             n = cross(column(a.rotation, i), column(b.rotation, j))
@@ -98,7 +89,7 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
             if length < PARALLEL_SINE:
                 continue
             n = _towards(c, divide(n, length))
-            found = separation_along(a, b, c, n)
+            found = dot(c, n) - half_width(a, n) - half_width(b, n)
             if found > s and found > bar:
                 s, axis = found, n
                 if s > cutoff:
@@ -107,12 +98,25 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
 
 
 @compiled
-def _hull_edge_axis(a: Shape, b: Shape, c: Vec3, best: Axis) -> Axis:
-    """The better of an axis and the products of edges of shapes of which one is a hull, if they
-    overlap by more than DEEP_RATIO along that axis; else it is returned.
+def _hull_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -> Axis:
+    """The same where a or b is a hull; products of edges count where they overlap by more than
+    DEEP_RATIO along the best face's normal.
     """
-    if best[0] > -DEEP_RATIO * min(bounding_radius(a), bounding_radius(b)):
-        return best
+    s, axis, bar = -MAX_PENETRATION, (0.0, 0.0, 0.0), -MAX_PENETRATION
+    for body in range(2):
+        own, other = (a, b) if body == 0 else (b, a)
+        towards = neg(c) if body == 0 else c
+        first, end = _faces(own)
+        for k in range(first, end):
+            n, reach = _face(own, k, towards)
+            found = dot(towards, n) - reach - core_extent(other, neg(n))
+            if found > s and found > bar:
+                s, axis = found, neg(n) if body == 0 else n
+                if s > cutoff:
+                    return s, axis
+        bar = s + bias * (FACE_BIAS + FACE_BIAS_RATIO * abs(s))
+    if s > -DEEP_RATIO * min(bounding_radius(a), bounding_radius(b)):
+        return s, axis
     (first_a, end_a), (first_b, end_b) = _edges(a), _edges(b)
     for i in range(first_a, end_a):
         for j in range(first_b, end_b):
@@ -124,16 +128,29 @@ def _hull_edge_axis(a: Shape, b: Shape, c: Vec3, best: Axis) -> Axis:
                 n = divide(n, length) if side == 0 else neg(n)
                 if _supports(a, i, neg(n)) and _supports(b, j, n):
                     found = separation_along(a, b, c, n)
-                    if found > best[0]:
-                        best = found, n
-    return best
+                    if found > s and found > bar:
+                        s, axis = found, n
+    return s, axis
 
 
 @compiled
-def _supports(shape: Shape, edge: int, n: Vec3) -> bool:
-    """Whether an edge of a hull, perpendicular to n, supports along n; of other shapes True."""
-    return shape.kind != HULL or is_supporting_edge(
-        shape.system, edge, to_local(shape.rotation, n))
+def _faces(shape: Shape) -> tuple[int, int]:
+    """First of the face normals, and after the last; each of a box or cylinder is of two faces."""
+    if shape.kind == HULL:
+        return hull_faces(shape.system, shape.hull)
+    return (0 if shape.kind == BOX else 3 if shape.kind == CAPSULE else 2), 3
+
+
+@compiled
+def _face(shape: Shape, k: int, towards: Vec3) -> tuple[Vec3, float]:
+    """Face normal k, world, of two that which does not point against ``towards``; and the extent,
+    m, of the shape along it.
+    """
+    if shape.kind == HULL:
+        normal, offset = hull_plane(shape.system, k)
+        return to_world(shape.rotation, normal), offset
+    n = _towards(towards, column(shape.rotation, k))
+    return n, core_extent(shape, n)
 
 
 @compiled
@@ -150,6 +167,13 @@ def _edge(shape: Shape, k: int) -> Vec3:
     if shape.kind == HULL:
         return to_world(shape.rotation, edge_vector(shape.system, shape.hull, k))
     return column(shape.rotation, k)
+
+
+@compiled
+def _supports(shape: Shape, edge: int, n: Vec3) -> bool:
+    """Whether an edge of a hull, perpendicular to n, supports along n; of other shapes True."""
+    return shape.kind != HULL or is_supporting_edge(
+        shape.system, edge, to_local(shape.rotation, n))
 
 
 @compiled

@@ -71,18 +71,25 @@ def bounding_radius(shape: Shape) -> float:
 
 
 @compiled
-def core_extent(shape: Shape, n: Vec3) -> float:
-    """Extent, m, of a shape's core along the unit vector n (world): its support function about the
-    centre, of a capsule that of its axis, without the radius. No spheres.
+def half_width(shape: Shape, n: Vec3) -> float:
+    """Half-width, m, of the core of a symmetric shape along the unit vector n (world): its support
+    function about the centre, of a capsule that of its axis, without the radius. No spheres.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
-    if shape.kind == HULL:
-        return dot(hull_support(shape.system, shape.hull, (x, y, z)), (x, y, z))
     if shape.kind == BOX:
         return size[0] * abs(x) + size[1] * abs(y) + size[2] * abs(z)
     if shape.kind == CAPSULE:
         return size[1] * abs(z)
     return size[0] * math.sqrt(x * x + y * y) + size[1] * abs(z)
+
+
+@compiled
+def core_extent(shape: Shape, n: Vec3) -> float:
+    """Extent, m, of a shape's core along the unit vector n (world): as half_width(), or of a hull."""
+    if shape.kind == HULL:
+        d = to_local(shape.rotation, n)
+        return dot(hull_support(shape.system, shape.hull, d), d)
+    return half_width(shape, n)
 
 
 @compiled
@@ -102,11 +109,11 @@ def extent(shape: Shape, n: Vec3) -> float:
 def support_point(shape: Shape, n: Vec3) -> Vec3:
     """Point of a shape's core farthest along n, from the centre, m, world axes; no spheres."""
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
-    if shape.kind == HULL:
-        return to_world(shape.rotation, hull_support(shape.system, shape.hull, (x, y, z)))
     if shape.kind == BOX:
         return to_world(shape.rotation, (
             math.copysign(size[0], x), math.copysign(size[1], y), math.copysign(size[2], z)))
+    if shape.kind == HULL:
+        return to_world(shape.rotation, hull_support(shape.system, shape.hull, (x, y, z)))
     across = math.sqrt(x * x + y * y)
     radius = 0.0 if shape.kind == CAPSULE or across == 0 else size[0] / across
     return to_world(shape.rotation, (x * radius, y * radius, math.copysign(size[1], z)))
@@ -137,10 +144,10 @@ def signed_distance(shape: Shape, p: Vec3, u: Vec3) -> tuple[float, Vec3]:
     Ericson, Real-Time Collision Detection (2005), section 5.1.
     """
     size = shape.size
-    if shape.kind == HULL:
-        return hull_distance(shape.system, shape.hull, p)
     if shape.kind == BOX:
         return _box_distance(size, p)
+    if shape.kind == HULL:
+        return hull_distance(shape.system, shape.hull, p)
     if shape.kind == CYLINDER:
         return _cylinder_distance(size, p, u)
     if shape.kind == CAPSULE:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..collision.narrow_phase import collide
-from ..collision.shapes import BOX, Shape, core_extent
+from ..collision.shapes import BOX, Shape, half_width
 from ..compiling.decorators import compiled
 from ..dynamics.body import WORLD
 from ..dynamics.kinematics import Kinematics
@@ -65,7 +65,7 @@ def _is_flush(box: Shape, other: Shape, normal: Vec3) -> bool:
         cosine = max(cosine, abs(dot(normal, column(box.rotation, axis))))
     rise = dot(normal, sub(box.position, other.position))
     return cosine > SAME_NORMAL and abs(
-        rise + core_extent(box, normal) - core_extent(other, normal)) < FLUSH
+        rise + half_width(box, normal) - half_width(other, normal)) < FLUSH
 
 
 @compiled
@@ -82,7 +82,7 @@ def _touches_edge(a: Shape, box: Shape, other: Shape, normal: Vec3, manifold: np
             direction = column(other.rotation, axis)
             if abs(dot(arm, direction)) > other.size[axis] + FLUSH:
                 return False
-        if abs(dot(arm, normal) - core_extent(other, normal)) > FLUSH:
+        if abs(dot(arm, normal) - half_width(other, normal)) > FLUSH:
             return False
     return found > 0
 
