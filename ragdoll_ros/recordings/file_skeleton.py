@@ -18,6 +18,7 @@ from ..files.gltf.character_file import (
     read_character_file,
     rider_pose,
 )
+from ..files.gltf.nodes import Nodes
 from ..model import errors, rotation
 from ..model.link_frames import LinkFrames
 from ..model.pose import Pose
@@ -78,7 +79,7 @@ def read_file_skeleton(doll: Ragdoll) -> FileSkeleton:
     linear = to_doll[:3, :3] @ source.bones.bind_matrices[chosen, :3, :3]
     return FileSkeleton(
         source, to_doll, tuple(rider.name for rider in riders), tuple(nodes),
-        _parents(nodes, source.nodes.parents), np.array(carriers),
+        _parents(nodes, source.nodes), np.array(carriers),
         Pose(*map(np.array, zip(*local, strict=True))), bound,
         rotation.matrix(rotation.inverse(bound.orientation)) @ linear)
 
@@ -109,13 +110,7 @@ def not_of_its_file(placement: Placement, error: Exception) -> str:
     return f"{placement.name} is saved with its doll's bones, not as its file: {error}"
 
 
-def _parents(nodes: list[int], parents: list[int]) -> tuple[int, ...]:
-    """Index of the nearest bone above each, by the nodes of bones and the parents of all nodes."""
-    place = {node: bone for bone, node in enumerate(nodes)}
-    found = []
-    for node in nodes:
-        up = parents[node]
-        while up >= 0 and up not in place:
-            up = parents[up]
-        found.append(place.get(up, -1))
-    return tuple(found)
+def _parents(own: list[int], nodes: Nodes) -> tuple[int, ...]:
+    """Index of the nearest bone above each bone, by the bones' ``own`` nodes."""
+    place = {node: bone for bone, node in enumerate(own)}
+    return tuple(place.get(nodes.nearest(nodes.parents[node], place), -1) for node in own)

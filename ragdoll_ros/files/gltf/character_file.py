@@ -100,9 +100,7 @@ def _edges(places: dict[int, tuple[Pose, np.ndarray]],
     """From the nearest rider above to each rider (e, 3): in the doll, in the file."""
     ours, theirs = [], []
     for node, (pose, bind) in places.items():
-        up = source.nodes.parents[node]
-        while up >= 0 and up not in places:
-            up = source.nodes.parents[up]
+        up = source.nodes.nearest(source.nodes.parents[node], places)
         if up >= 0:
             ours.append(pose.position - places[up][0].position)
             theirs.append(bind[:3, 3] - places[up][1][:3, 3])

@@ -1,4 +1,5 @@
 """Nodes of a glTF file as a forest with global transforms."""
+from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,14 @@ class Nodes:
     """(n, 4, 4) global transforms, from the node's frame to the world; units of the file."""
     locals: np.ndarray
     """(n, 4, 4) transforms from the node's frame to its parent's."""
+
+    def nearest(self, node: int, among: Container[int]) -> int:
+        """The node itself if it is ``among`` these nodes, else the nearest one above it that is;
+        -1 if there is none.
+        """
+        while node >= 0 and node not in among:
+            node = self.parents[node]
+        return node
 
 
 def read_nodes(file: GltfFile) -> Nodes:

@@ -131,7 +131,7 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
         upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
         positions, vertices, linear = positions @ upright.T, vertices @ upright.T, upright @ linear
         axes = upright @ axes
-    parents = tuple(_parent_bone(node, nodes.parents, place) for node in joints)
+    parents = tuple(_parent_bone(node, nodes, place) for node in joints)
     metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
     springs = _springs(file, nodes, skins, place, metres * axes, notes)
     appearance = _read_appearance(file, skins, axes, notes)
@@ -162,7 +162,7 @@ def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
     """Spring bones of the character; ``matrix`` (3, 3) takes their points to its frame."""
     found = []
     for spring in read_springs(file, nodes, notes):
-        carrier = _parent_bone(spring.nodes[0], nodes.parents, place)
+        carrier = _parent_bone(spring.nodes[0], nodes, place)
         if carrier < 0:
             notes.append(f'spring {spring.name} has no bone above it: ignored')
             continue
@@ -171,8 +171,7 @@ def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
         links = {place[node]: min(number, len(spring.joints) - 1)
                  for number, node in enumerate(spring.nodes) if node in place}
         colliders = [placed(collider, node_matrix(collider.node, nodes, skins.bind_matrices),
-                            place.get(collider.node, _parent_bone(collider.node, nodes.parents,
-                                                                  place)))
+                            place.get(nodes.nearest(collider.node, place), -1))
                      for collider in spring.colliders]
         found.append(drop_short_segments(replace(
             spring, points=spring.points @ matrix.T, carrier=carrier, bones=tuple(links),
@@ -184,12 +183,9 @@ def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
     return tuple(replace(spring, name=name) for spring, name in zip(found, names, strict=True))
 
 
-def _parent_bone(node: int, parents: list[int], place: dict[int, int]) -> int:
+def _parent_bone(node: int, nodes: Nodes, place: dict[int, int]) -> int:
     """Bone of the nearest ancestor node that is a bone, -1 if there is none."""
-    node = parents[node]
-    while node >= 0 and node not in place:
-        node = parents[node]
-    return place.get(node, -1)
+    return place.get(nodes.nearest(nodes.parents[node], place), -1)
 
 
 def yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:

@@ -23,7 +23,7 @@ def add_rigid_meshes(file: GltfFile, nodes: Nodes, skins: Skins) -> None:
         skins.bind_matrices.update((bone, nodes.worlds[bone]) for bone in bones.values())
         skins.notes.append(f'no skin: the {len(bones)} meshes become rigid parts')
     else:
-        bones = {node: _bone_above(nodes, skins, node) for node in unskinned_meshes(file)}
+        bones = {node: nodes.nearest(node, skins.bind_matrices) for node in unskinned_meshes(file)}
     left = sum(not _add(file, nodes, skins, node, bone) for node, bone in bones.items())
     if left:
         skins.notes.append(f'{left} mesh{"es" * (left > 1)} without a skin and a bone ignored')
@@ -44,9 +44,3 @@ def _add(file: GltfFile, nodes: Nodes, skins: Skins, node: int, bone: int) -> bo
                   np.full((len(points), 1), bone, np.int32), np.ones((len(points), 1)),
                   replace(appearance, normals=appearance.normals @ place[:3, :3].T))
     return True
-
-
-def _bone_above(nodes: Nodes, skins: Skins, node: int) -> int:
-    while node >= 0 and node not in skins.bind_matrices:
-        node = nodes.parents[node]
-    return node

@@ -130,7 +130,7 @@ def _spring(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> SpringBone
     for number, joint in enumerate(joints):
         place, node = f'{where}.joints[{number}].node', joint.get('node')
         file.entry('nodes', node, place)
-        if chain and not _is_descendant(node, chain[-1], nodes):
+        if chain and nodes.nearest(nodes.parents[node], chain[-1:]) < 0:
             raise errors.WrongForm(place, node, f'a node below nodes[{chain[-1]}], which is '
                                    'before it in the chain')
         chain.append(node)
@@ -175,9 +175,7 @@ def _spring_joint(data: dict, where: str) -> SpringJoint:
 
 def node_matrix(node: int, nodes: Nodes, bind_matrices: dict[int, np.ndarray]) -> np.ndarray:
     """Transform (4, 4) of a node, fixed to the nearest skin joint at or above it."""
-    joint_node = node
-    while joint_node >= 0 and joint_node not in bind_matrices:
-        joint_node = nodes.parents[joint_node]
+    joint_node = nodes.nearest(node, bind_matrices)
     if joint_node in (node, -1):
         return bind_matrices[node] if joint_node >= 0 else nodes.worlds[node]
     try:
@@ -186,13 +184,6 @@ def node_matrix(node: int, nodes: Nodes, bind_matrices: dict[int, np.ndarray]) -
         raise errors.WrongForm(f'nodes[{joint_node}]', 'a scale of zero',
                                'nodes that give a spring a length') from None
     return bind_matrices[joint_node] @ back @ nodes.worlds[node]
-
-
-def _is_descendant(node: int, above: int, nodes: Nodes) -> bool:
-    node = nodes.parents[node]
-    while node not in (-1, above):
-        node = nodes.parents[node]
-    return node == above
 
 
 def _name(file: GltfFile, given: object, node: int) -> str:
