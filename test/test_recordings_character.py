@@ -265,6 +265,20 @@ def test_every_bone_of_the_file_is_within_a_micrometre_at_every_instant(run):
                                    rtol=0, atol=1e-6)
 
 
+def test_an_armature_far_from_the_origin_of_its_file_costs_no_digits(tmp_path):
+    """40 000 units away 32 bits would leave 4e-5 m."""
+    rig = fit_rigs.RIGS['turned_scaled_moved']
+    path = fit_rigs.write(dataclasses.replace(rig, root=fit_rigs.matrix(
+        (-fit_rigs.HALF, 0, 0, fit_rigs.HALF), 0.01, (400, 0, -300))), tmp_path)
+    doll = dataclasses.replace(fit_character(read_character(path)).doll, model=str(path))
+    recording, states = moved(above_ground(doll), TICKS)
+    read, riders = Read(gltf_bytes(recording)), Riders(recording.scene)
+    nodes = [read.names.index(name) for name in riders.names]
+    places = read.at_key(TICKS - 1).worlds()[nodes][:, :3, 3]
+    np.testing.assert_allclose(to_ros(places), riders.poses(states[-1]).position, rtol=0,
+                               atol=1e-6)
+
+
 def blended(character, recording, state):
     """Sum of w P R^-1 v (v, 3) of a character as the fit reads it, with its bones on the doll's."""
     riders = Riders(recording.scene)

@@ -38,9 +38,7 @@ def add_character(animation: GltfAnimation, copied: CopiedFile, skeleton: FileSk
         OSError: it cannot be read.
     """
     poses = skeleton.poses(bones)
-    places = points_y_up(poses.position)
-    origin = np.round((places.max(axis=(0, 1)) + places.min(axis=(0, 1))) / 2)
-    root = doll_node(skeleton, origin)
+    root = doll_node(skeleton, points_y_up(poses.position))
     motions = bone_motions(skeleton, poses, root)
     nodes, glb = skeleton.source.nodes, animation.glb
     base = len(glb.document.get('nodes', []))

@@ -54,11 +54,20 @@ class LocalMotion:
                 'rotation': self.rotation[0].tolist(), **scale}
 
 
-def doll_node(skeleton: FileSkeleton, origin: np.ndarray) -> LocalMotion:
-    """Transform of the node above all of the file's, at ``origin`` (3,), Y up: units and axes."""
+def doll_node(skeleton: FileSkeleton, places: np.ndarray) -> LocalMotion:
+    """Transform of the node above all of the file's: units and axes.
+
+    It takes the parent of the first bone to the middle of the bones' ``places`` (k, n, 3) m, Y up,
+    to whole metres: a bone is written in its parent, with 32 bits, so that it should be near it.
+    """
     matrix = np.eye(4)
     matrix[:3, :3] = points_y_up(skeleton.to_doll[:3, :3].T).T
-    matrix[:3, 3] = origin
+    nodes = skeleton.source.nodes
+    above = nodes.parents[skeleton.nodes[0]]
+    middle = (places.max(axis=(0, 1)) + places.min(axis=(0, 1))) / 2
+    if above >= 0:
+        middle = middle - matrix[:3, :3] @ nodes.worlds[above][:3, 3]
+    matrix[:3, 3] = np.round(middle)
     return decomposed(matrix[None])
 
 
