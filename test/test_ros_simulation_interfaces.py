@@ -202,7 +202,7 @@ def test_a_robot_in_sdf_is_its_links_and_joints(tmp_path):
         with Simulation(Scene('one', (placed,))) as simulation:
             np.testing.assert_allclose(simulation.state.positions, [[1, 2, 3], [1, 2, 3.8]],
                                        atol=1e-12)
-    with pytest.raises(Refusal, match='2 robots; expected of one') as refused:
+    with pytest.raises(Refusal, match='2 dolls; expected of one') as refused:
         doll_of('', TWO_FLAILS_SDF)
     assert refused.value.code == 108
 

@@ -45,24 +45,27 @@ def doll_of(uri: str, text: str) -> Found:
     is none of these.
     """
     try:
-        return _of_file(uri) if uri else _of_text(text)
+        found = _of_file(uri) if uri else _of_text(text)
     except Refusal:
         raise
     except (RagdollError, OSError) as error:
         raise Refusal(RESOURCE_PARSE_ERROR, error) from None
+    if len(found) != 1:
+        raise Refusal(UNSUPPORTED_ASSETS, f'a resource of {len(found)} dolls; expected of one')
+    return found[0]
 
 
-def _of_file(uri: str) -> Found:
+def _of_file(uri: str) -> list[Found]:
     name = scene_of(uri, '', UNSUPPORTED_FORMAT, (*YAML, *URDF, *SDF, *CHARACTERS))
-    readers: dict[tuple[str, ...], Callable[[Path], Found]] = {
-        URDF: _robot, SDF: _robot_of_sdf, CHARACTERS: _character}
+    readers: dict[tuple[str, ...], Callable[[Path], list[Found]]] = {
+        URDF: _robot, SDF: _robots_of_sdf, CHARACTERS: _characters}
     for ends, read in readers.items():
         if name.lower().endswith(ends):
             return read(find(name))
     path = find(name)
     if path.parent == config_folder():
-        return _one(_shipped(str(path), path.stat().st_mtime_ns))
-    return _one(load_scene(name).dolls)
+        return _of_scene(_shipped(str(path), path.stat().st_mtime_ns))
+    return _of_scene(load_scene(name).dolls)
 
 
 @functools.lru_cache(MOST_KEPT)
@@ -73,12 +76,13 @@ def _shipped(path: str, _: int) -> tuple[Placement, ...]:
     return load_scene(path).dolls
 
 
-def _of_text(text: str) -> Found:
+def _of_text(text: str) -> list[Found]:
     if not text.strip():
         raise Refusal(NO_RESOURCE, 'uri and resource_string are empty; expected a name in config/, '
                       'a path, YAML, URDF or SDF')
     if not text.lstrip().startswith('<'):
-        return _one(scene_from_data(yaml_text.parse(text.encode()), Path('/resource_string')).dolls)
+        data = yaml_text.parse(text.encode())
+        return _of_scene(scene_from_data(data, Path('/resource_string')).dolls)
     root = ROOT.search(text)
     if root is None:
         raise Refusal(UNSUPPORTED_FORMAT, 'resource_string: XML without <robot and <sdf; expected '
@@ -86,30 +90,27 @@ def _of_text(text: str) -> Found:
     # Imported here: no node needs the fit that spawns none of these.
     if root[1] == 'sdf':
         from ....fit.robots.sdf_dolls import dolls_from_sdf
-        return _one_robot(dolls_from_sdf(text))
+        return [Found(*each) for each in dolls_from_sdf(text)]
     from ....fit.robots.robot import doll_from_urdf
-    return Found(Placement(doll_from_urdf(text)))
+    return [Found(Placement(doll_from_urdf(text)))]
 
 
-def _robot(path: Path) -> Found:
+def _of_scene(dolls: tuple[Placement, ...]) -> list[Found]:
+    return [Found(placement) for placement in dolls]
+
+
+def _robot(path: Path) -> list[Found]:
     """The doll of a URDF: the robot with its motors off."""
     from ....fit.robots.robot import read_urdf
     _check_root(path, 'robot', 'URDF')
     doll, notes = read_urdf(path)
-    return Found(Placement(doll), notes)
+    return [Found(Placement(doll), notes)]
 
 
-def _robot_of_sdf(path: Path) -> Found:
-    """The doll of an SDF of one robot."""
+def _robots_of_sdf(path: Path) -> list[Found]:
     from ....fit.robots.sdf_dolls import read_sdf
     _check_root(path, 'sdf', 'SDF')
-    return _one_robot(read_sdf(path))
-
-
-def _one_robot(robots: list[tuple[Placement, tuple[str, ...]]]) -> Found:
-    if len(robots) > 1:
-        raise Refusal(UNSUPPORTED_ASSETS, f'an SDF of {len(robots)} robots; expected of one')
-    return Found(*robots[0])
+    return [Found(*each) for each in read_sdf(path)]
 
 
 def _check_root(path: Path, tag: str, name: str) -> None:
@@ -118,17 +119,9 @@ def _check_root(path: Path, tag: str, name: str) -> None:
         raise Refusal(RESOURCE_PARSE_ERROR, f'{path}: a file without <{tag}; expected {name}')
 
 
-def _character(path: Path) -> Found:
-    """A doll that is fitted to a character, as it stands in its file."""
+def _characters(path: Path) -> list[Found]:
+    """Dolls that are fitted to the characters of a file, as they stand in it."""
     from ....fit.pipeline import fit_characters
     from ....fit.reading.character import read_character
-    fits = fit_characters(read_character(path))
-    if len(fits) > 1:
-        raise Refusal(UNSUPPORTED_ASSETS, f'a file of {len(fits)} characters; expected of one')
-    return Found(fits[0].placed(model=str(path)), tuple(fits[0].notes))
-
-
-def _one(dolls: tuple[Placement, ...]) -> Found:
-    if len(dolls) > 1:
-        raise Refusal(UNSUPPORTED_ASSETS, f'a scene of {len(dolls)} dolls; expected of one')
-    return Found(dolls[0])
+    return [Found(fit.placed(model=str(path)), tuple(fit.notes))
+            for fit in fit_characters(read_character(path))]
