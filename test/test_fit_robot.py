@@ -254,6 +254,14 @@ def test_a_fixed_joint_needs_no_axis_and_a_prefix_no_namespace(tmp_path):
         read(tmp_path, link('a'), '<xacro:wheel name="b"/>')
 
 
+@pytest.mark.parametrize('quote', '"\'')
+def test_a_default_namespace_changes_no_name(quote):
+    """As of the quadrotor of Drake and Bullet."""
+    text = f'<robot name="r">{link("a")}</robot>'
+    spaced = text.replace('name="r"', f'xmlns = {quote}http://drake.mit.edu{quote}\n name="r"')
+    assert doll_from_urdf(spaced) == doll_from_urdf(text)
+
+
 def test_what_is_only_seen_is_a_body_where_nothing_has_a_mass(tmp_path):
     seen = link('b', mass=0, tag='visual')
     assert len(read(tmp_path, link('a', mass=0), seen, joint('b'))[0].bones) == 2

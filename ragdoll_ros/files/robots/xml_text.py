@@ -14,6 +14,8 @@ LARGEST_TEXT = 32_000_000
 PREFIX = re.compile(r'<([A-Za-z_][\w.-]*):[A-Za-z_]|\s([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*\s*=')
 """The prefix of the name of an element, or of an attribute."""
 
+DEFAULT_NAMESPACE = re.compile(r'\bxmlns\s*=\s*("[^"]*"|\'[^\']*\')')
+
 COMMENT = re.compile(r'<!--.*?-->', re.DOTALL)
 
 FIRST_TAG = re.compile(r'(<(?:robot|sdf)\b)')
@@ -40,6 +42,8 @@ def parse_root(text: str, tag: str) -> ElementTree.Element:
     text = COMMENT.sub(lambda comment: '\n' * comment[0].count('\n'), text)
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
         raise errors.Unreadable('', 'a DOCTYPE', f'{NAMES[tag]} without entities')
+    # Here it would be part of all names; other tools do not look at it.
+    text = DEFAULT_NAMESPACE.sub('', text)
     try:
         root = ElementTree.fromstring(_declare_prefixes(text))
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
