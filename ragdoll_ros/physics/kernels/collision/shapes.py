@@ -85,7 +85,7 @@ def half_width(shape: Shape, n: Vec3) -> float:
 
 @compiled
 def core_extent(shape: Shape, n: Vec3) -> float:
-    """Extent, m, of a shape's core along the unit vector n (world): as half_width(), or of a hull."""
+    """Extent, m, of a shape's core along the unit vector n, world: half_width(), or a hull's."""
     if shape.kind == HULL:
         d = to_local(shape.rotation, n)
         return dot(hull_support(shape.system, shape.hull, d), d)
