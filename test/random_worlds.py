@@ -1,6 +1,8 @@
 """Random worlds, reproducible: the default doll falls over bodies of all kinds; and what is bad.
 
-`python test/random_worlds.py --starts 10008` tells of so many.
+`python test/random_worlds.py --starts 10008` tells of so many. `--scene stairs` throws the first
+doll of a shipped scene instead, at up to 1 m/s and 1 rad/s along each axis more, for 20 s or until
+it sleeps.
 """
 from __future__ import annotations
 
@@ -8,8 +10,10 @@ import argparse
 import dataclasses
 import math
 import sys
+import time
 
 import numpy as np
+from pair_cost import thrown
 
 from ragdoll_ros import (
     Box,
@@ -30,12 +34,12 @@ from ragdoll_ros import (
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import Material
 
-SECONDS = 3.0
+SECONDS, AT_REST_BY = 3.0, 20.0
 SPREAD = 1.2
 """m: bodies are within so much of the doll, along x and y."""
 
 EXCESS = 1e-5
-"""Largest share of the energy of the fall that may come from nothing, as of the 10 008 starts."""
+"""Largest energy from nothing over that of a fall by 1 m, as of the 10 008 starts."""
 
 DEEPEST = 1e-3
 """m, on the way and at the end, as on the ground."""
@@ -142,7 +146,7 @@ class Figures:
     """What a fall in a world shows."""
 
     excess: float
-    """Energy from nothing over that of the fall, infinite if a state was not finite."""
+    """Energy from nothing over that of a fall by 1 m, infinite if a state was not finite."""
     depth: float
     """m: deepest that a bone was in a body or in the ground."""
     where: str
@@ -153,6 +157,10 @@ class Figures:
     """rad: farthest that a joint was past a limit."""
     overlaps: bool
     """Whether the doll begins in something: such a world is none."""
+    sleeps: bool
+    """Whether all sleeps at the end."""
+    cost: float
+    """s of CPU time."""
 
     @property
     def is_bad(self) -> bool:
@@ -162,25 +170,27 @@ class Figures:
                                           and self.overshoot <= FARTHEST)
 
 
-def fall(number: int, accuracy: str = 'normal') -> Figures:
-    """The fall in world ``number``."""
-    scene = world(number)
+def fall(scene: Scene, accuracy: str = 'normal', seconds: float = SECONDS) -> Figures:
+    """The fall in a world."""
     deepest, where, overshoot = 0.0, '', 0.0
+    begin = time.process_time()
     with Simulation(scene, accuracy=accuracy, engine='rigid') as simulation:
         overlaps = bool(simulation.initial_overlaps)
-        for tick in range(round(SECONDS / scene.step)):
+        for tick in range(round(seconds / scene.step)):
+            if simulation.asleep and seconds > SECONDS:
+                break
             state = simulation.advance()
             if not np.isfinite(state.rows).all():
-                return Figures(math.inf, deepest, where, math.inf, math.inf, overlaps)
+                return Figures(math.inf, deepest, where, math.inf, math.inf, overlaps, False, 0)
             if tick % EVERY == 0:
                 depth, body = deepest_in_bodies(scene, state)
                 if depth > deepest:
                     deepest, where = depth, f'{body} at {tick / 100:.2f} s'
                 overshoot = max(overshoot, simulation.measures()['limit_overshoot_rad'])
-        excess = simulation.measures()['energy_excess_J']
-    own = scene.dolls[0].doll.mass * 9.8 * scene.dolls[0].position[2]
+        excess, sleeps = simulation.measures()['energy_excess_J'], simulation.asleep
+    own = scene.dolls[0].doll.mass * 9.8
     return Figures(excess / own, deepest, where, deepest_in_bodies(scene, state)[0],
-                   overshoot, overlaps)
+                   overshoot, overlaps, sleeps, time.process_time() - begin)
 
 
 def deepest_in_bodies(scene: Scene, state) -> tuple[float, str]:
@@ -245,11 +255,16 @@ def main() -> int:
                         help='number of worlds (1000)')
     parser.add_argument('--first', type=int, default=0, help='number of the first one')
     parser.add_argument('--accuracy', default='normal', choices=('draft', 'normal', 'exact'))
+    parser.add_argument('--scene', help='a shipped scene in place of random worlds: stairs')
     options = parser.parse_args()
-    good = overlapping = 0
-    deepest, overshoot, excess, bad = 0.0, 0.0, -math.inf, 0
+    good = overlapping = awake = 0
+    deepest, overshoot, excess, bad, longest = 0.0, 0.0, -math.inf, 0, 0.0
     for number in range(options.first, options.first + options.starts):
-        found = fall(number, options.accuracy)
+        if options.scene:
+            found = fall(thrown(load_scene(options.scene), number), options.accuracy, AT_REST_BY)
+        else:
+            found = fall(world(number), options.accuracy)
+        awake, longest = awake + (not found.sleeps), max(longest, found.cost)
         if found.is_bad:
             bad += 1
             print(number, found)
@@ -262,7 +277,8 @@ def main() -> int:
             excess = max(excess, found.excess)
     print(f'{bad} bad; {good} good, at most {1e3 * deepest:.3f} mm deep, '
           f'{math.degrees(overshoot):.3f} degrees past a limit, {excess:.1e} of the energy from '
-          f'nothing; {overlapping} began in a body')
+          f'nothing; {overlapping} began in a body; {awake} awake at the end; at most '
+          f'{longest:.1f} s of CPU time')
     return bad > 0
 
 

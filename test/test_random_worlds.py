@@ -17,7 +17,7 @@ STARTS, CHUNK = 1000, 50
 @pytest.mark.parametrize(('accuracy', 'first'), [('draft', 1), ('normal', 2), ('exact', 3)])
 def test_a_few_falls_over_random_worlds_are_good(accuracy, first):
     for number in range(first, first + 3):
-        found = fall(number, accuracy)
+        found = fall(world(number), accuracy)
         assert not found.is_bad, (number, found)
 
 
@@ -25,7 +25,7 @@ def test_a_few_falls_over_random_worlds_are_good(accuracy, first):
 @pytest.mark.parametrize('first', range(0, STARTS, CHUNK))
 def test_none_of_a_thousand_falls_over_random_worlds_is_bad(first):
     """Energy to EXCESS of that of the fall, depth to DEEPEST."""
-    found = {number: fall(number) for number in range(first, first + CHUNK)}
+    found = {number: fall(world(number)) for number in range(first, first + CHUNK)}
     assert {number: one for number, one in found.items() if one.is_bad} == {}
     assert sum(one.overlaps for one in found.values()) < CHUNK / 5, 'most of them are falls'
 
