@@ -90,7 +90,7 @@ setup(
         'report': ['scipy', 'matplotlib', 'mujoco'],
         # Compared in the report where they are installed.
         'peers': ['dartpy', 'drake'],
-        'fit': ['matplotlib', 'trimesh', 'pycollada', 'scipy', 'DracoPy', 'xacro'],
+        'fit': ['matplotlib', 'trimesh', 'pycollada', 'scipy', 'DracoPy', 'vhacdx', 'xacro'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         # Its range is that of viewer/viser_internals.py, which uses private names of viser.
         'viewer': ['viser>=1.1.1,<1.2', 'imageio', 'mcap'],

@@ -185,14 +185,24 @@ def test_an_upload_that_is_no_mesh_is_refused_in_words(server, tmp_path, name, c
     assert desk.editor.scene == DROP and not list(tmp_path.iterdir())
 
 
-def test_an_uploaded_scene_reads_no_surface_from_outside(server, tmp_path):  # noqa: F811
+@pytest.mark.parametrize(('place', 'text'), [
+    ('bodies[0].shape.mesh', 'dolls: [{doll: doll}]\nbodies: [{name: rock, shape: '
+     '{mesh: {file: "%s"}}}]'),
+    ('bodies[0].shape.hulls', 'dolls: [{doll: doll}]\nbodies: [{name: rock, shape: '
+     '{hulls: {file: "%s"}}}]'),
+    ('bodies[0].shapes[0].hull', 'dolls: [{doll: doll}]\nbodies: [{name: rock, shapes: '
+     '[{hull: {file: "%s"}}]}]'),
+    ('dolls[0].doll.bones[0].shapes[0].hull', 'dolls: [{doll: {bones: [{name: rock, mass: 1, '
+     'position: [0, 0, 0], shapes: [{hull: {file: "%s"}}]}], joints: []}}]'),
+    ('bones[0].shapes[0].hull', 'bones: [{name: rock, mass: 1, position: [0, 0, 0], shapes: '
+     '[{hull: {file: "%s"}}]}]\njoints: []')])
+def test_an_uploaded_scene_reads_no_mesh_from_outside(server, tmp_path, place, text):  # noqa: F811
     outside = tmp_path / 'secret.stl'
     outside.write_bytes(stl(TETRAHEDRON[FACES]))
     folder = tmp_path / 'folder'
     folder.mkdir()
     desk = Desk(server, folder)
     for file in (str(outside), '../secret.stl'):
-        desk.files.upload('scene.yaml', b'dolls: [{doll: doll}]\nbodies: [{name: rock, shape: '
-                          b'{mesh: {file: "%s"}}}]' % file.encode())
-        assert 'bodies[0].shape.mesh.file' in desk.said() and f'inside {folder}' in desk.said()
+        desk.files.upload('scene.yaml', (text % file).encode())
+        assert f'{place}.file' in desk.said() and f'inside {folder}' in desk.said()
     assert desk.editor.scene == DROP

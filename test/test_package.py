@@ -36,7 +36,7 @@ DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib', 'DracoPy': 'dra
 
 ROBOT = ('model', 'files', 'physics', 'realtime', 'ros')
 """Rooms that run on a robot, with OPTIONAL modules or without."""
-OPTIONAL = {'mujoco', 'mcap', 'trimesh', 'imageio'}
+OPTIONAL = {'mujoco', 'mcap', 'trimesh', 'vhacdx', 'imageio'}
 OPTIONAL_IN_ROS = {'hri_msgs'}
 """Taken where the user's ROS has it; pip does not."""
 NUMBAS = {'llvmlite'}

@@ -258,7 +258,7 @@ ENTRY = '{{name: a, urdf: r.urdf, {}}}'
      'expected exactly one of shape, shapes, urdf, sdf'),
     ('{name: a, shape: {sphere: {radius: 1}}, meshes: box}', '', '.meshes: WrongForm: '),
     (ENTRY.format('mass: 3'), ARM, '.mass: WrongForm: 3; expected none: a robot never'),
-    (ENTRY.format('meshes: hulls'), ARM, ".meshes: WrongForm: 'hulls'; expected one of"),
+    (ENTRY.format('meshes: convex'), ARM, ".meshes: WrongForm: 'convex'; expected one of"),
     (ENTRY.format('angles_deg: {hip: 3}'), ARM, ".angles_deg.hip: UnknownJoint: 'hip'; expected "
      'one of shoulder, elbow'),
     (ENTRY.format('angles_deg: {elbow: 3}'), ARM, '.angles_deg.elbow: OutOfRange: 3; expected '

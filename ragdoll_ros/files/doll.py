@@ -25,7 +25,7 @@ from .schema import (
     schema_errors,
     value_or_raise,
 )
-from .surfaces import build_hull, hull_data
+from .surfaces import HULLS, build_hull, build_hulls, hull_data
 
 LARGEST_MASS_RATIO = 1e8
 """Largest ratio of two masses in a file. Robots have up to 6.1e7; at 2e8 a tick takes a second, as
@@ -159,9 +159,12 @@ def _part(data: dict, folder: Path) -> Part:
 
 
 def build_shape(data: dict, folder: Path = Path('/')) -> Shape | Compound:
-    """The shape of a bone or body that has ``shape`` or ``shapes``; paths of hulls are relative to
+    """The shape of a bone or body that has ``shape`` or ``shapes``; paths of meshes are relative to
     ``folder``. Raises ModelError.
     """
+    if HULLS in data.get('shape', ()):
+        return _at(f'shape.{HULLS}', build_hulls,
+                   {'data': data['shape'][HULLS], 'folder': folder})
     if 'shape' in data:
         return _shape(data['shape'])
     found: list[ModelError] = []

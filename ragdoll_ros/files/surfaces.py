@@ -1,21 +1,29 @@
 """Shapes that static bodies alone have, planes, height fields from numbers, .npy and pictures, and
-meshes; and hulls of meshes, which move as parts of a Compound.
+meshes; and hulls of meshes, one or several, which move as parts of a Compound.
 """
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..model import errors
+from ..model.compound import Compound
 from ..model.mesh import SURFACES, HeightField, Hull, Mesh, Surface
 from ..model.plane import Plane
-from ..model.vectors import floats
+from ..model.shapes import Part
+from ..model.vectors import Vector, floats, vector
 from .config import config_folder
+from .robots.hull_decomposition import read_hulls
 from .robots.mesh_file import UNSCALED, convex_hull, find_file, read_hull, read_surface
+from .schema import Made
 
 MAX_BYTES = 64_000_000
 """Of a file of heights; a million cells of doubles have 8 MB."""
+
+HULLS = 'hulls'
+"""Key of the hulls of a mesh in a shape."""
 
 PICTURES = ('.png', '.tif', '.tiff')
 
@@ -50,6 +58,11 @@ def build_hull(data: dict, folder: Path) -> Hull:
         raise error if error.path.startswith(Hull.kind) else error.at(Hull.kind) from None
     assert isinstance(hull, Hull)
     return dataclasses.replace(hull, source=None)
+
+
+def build_hulls(data: dict, folder: Path) -> Compound:
+    """The hulls of a mesh file as one shape. Raises ModelError."""
+    return Compound(tuple(map(Part, _read(read_hulls, data, folder))))
 
 
 def hull_data(hull: Hull) -> dict:
@@ -97,9 +110,14 @@ def _mesh(kind: str, data: dict, folder: Path) -> Mesh:
             return Mesh(data['vertices'], data['faces'])
         return Hull(data['vertices'], data['faces']) if 'faces' in data else convex_hull(
             np.array(data['vertices'], float))
-    path, scale = _found('file', data['file'], folder), floats(data.get('scale', UNSCALED))
+    return _read(read_hull if kind == Hull.kind else read_surface, data, folder)
+
+
+def _read(read: Callable[[Path, Vector], Made], data: dict, folder: Path) -> Made:
+    """What ``read`` makes of the file of ``data`` and its scale. Raises ModelError."""
+    path, scale = _found('file', data['file'], folder), vector(data.get('scale', UNSCALED))
     try:
-        return (read_hull if kind == Hull.kind else read_surface)(path, scale)
+        return read(path, scale)
     except errors.ModelError as error:
         raise type(error)(f'file.({path.name})', error.value, error.expected) from None
 

@@ -7,6 +7,7 @@ are also distributed without ROS.
 import contextlib
 import io
 import logging
+import math
 import os
 import urllib.parse
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ...model import errors, rotation
-from ...model.mesh import Hull, Mesh
+from ...model.mesh import THINNEST, Hull, Mesh
 from ...model.pose import Pose
 from ...model.shapes import Box
 from ...model.vectors import vector
@@ -151,11 +152,40 @@ def convex_hull(points: np.ndarray, source: tuple | None = None) -> Hull:
         raise errors.Unreadable('', f'{len(points)} points', 'points around a volume')
     try:
         from trimesh.convex import convex_hull as hull_of
-        found = hull_of(points)
     except ImportError:
         raise errors.Unreadable('', f'{len(points)} points',
                                 "trimesh and scipy for a hull: pip install '.[fit]'") from None
-    return Hull(np.asarray(found.vertices, float), np.asarray(found.faces), source)
+    while True:
+        found = hull_of(points)
+        vertices, faces = np.asarray(found.vertices, float), np.asarray(found.faces)
+        needless = _apexes_of_thin(vertices, faces)
+        if not len(needless):
+            return Hull(vertices, faces, source)
+        points = np.delete(vertices, needless, axis=0)
+
+
+def _apexes_of_thin(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Vertices on the longest edge of a triangle that has no normal, but for rounding: where points
+    are nearly on a line, Qhull makes such triangles.
+    """
+    corners = vertices[faces]
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0],
+                                         corners[:, 2] - corners[:, 0]), axis=1)
+    thin = twice_area <= 2 * THINNEST * lengths.max(axis=1) ** 2
+    # The edge from corner k to k + 1 is opposite to k + 2.
+    return np.unique(faces[thin, (lengths[thin].argmax(axis=1) + 2) % 3])
+
+
+def enclosed_volume(mesh: Mesh) -> float:
+    """Volume, m^3, of the inside of a mesh that is one closed surface; of others NaN: their signed
+    volumes count twice where they overlap. Needs trimesh and scipy.
+    """
+    import trimesh
+
+    with np.errstate(all='ignore'):
+        solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        return float(solid.volume) if solid.is_volume and solid.body_count == 1 else math.nan
 
 
 def bounding_box(triangles: np.ndarray) -> tuple[Box, Pose]:

@@ -4,6 +4,7 @@ Static ones: one of the primitive shapes of each link, and one of each plane and
 link has. With `follow` a robot that moves: a body of each link, in the link's frame.
 """
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from ...model.static_body import DEFAULT_COLOR, StaticBody
 from ...model.vectors import Quaternion, Vector, floats
 from ..config import config_folder
 from ..doll import plain_name
+from .hull_decomposition import read_hulls
 from .mesh_file import bounding_box, find_file, read_hull, read_mesh, read_surface
 from .sdf_tree import parse_sdf
 from .urdf_tree import (
@@ -52,7 +54,7 @@ NOMINAL_MASS = 1.0
 SURFACE = ('friction', 'rolling_friction', 'restitution', 'color')
 """Keys of entries that hold for the bodies of all links."""
 
-MESHES = ('box', 'hull', 'exact')
+MESHES = ('box', 'hull', 'hulls', 'exact')
 """What `meshes` may be."""
 
 INSTEAD = {'an <include>': 'the model itself, as `gz sdf -p FILE` prints it'}
@@ -159,17 +161,18 @@ def _bodies(link: UrdfLink, pose: Pose, entry: dict, folder: Path,
                                    f'by `without: [{link.name}]`')
     solids: list[tuple[Shape | Hull, Pose]] = list(link.shapes)
     others: list[tuple[Plane | Mesh, Pose]] = [(Plane(), place) for place in link.planes]
-    for mesh in link.meshes:
-        shape, place = _mesh_shape(mesh, entry.get('meshes'), folder)
-        if isinstance(shape, Hull) and 'follow' in entry:
+    how = entry.get('meshes')
+    for shape, place in itertools.chain.from_iterable(
+            _mesh_shapes(mesh, how, folder) for mesh in link.meshes):
+        if isinstance(shape, Hull) and (how == 'hulls' or 'follow' in entry):
             solids.append((dataclasses.replace(shape, source=None), place))
         elif isinstance(shape, Mesh):
             others.append((shape, place))
         else:
             solids.append((shape, place))
     if others and 'follow' in entry:
-        raise errors.WrongForm('', f'a {others[0][0].kind}', f'{PRIMITIVES}, or `meshes: hull` or '
-                               '`box`: no other moves; leave the link out by '
+        raise errors.WrongForm('', f'a {others[0][0].kind}', f'{PRIMITIVES}, or `meshes: hull`, '
+                               '`hulls` or `box`: no other moves; leave the link out by '
                                f'`without: [{link.name}]`')
     is_one = len(solids) == 1 and not isinstance(solids[0][0], Hull)
     found: list[tuple[Any, Pose]] = list(solids) if is_one else [
@@ -180,18 +183,26 @@ def _bodies(link: UrdfLink, pose: Pose, entry: dict, folder: Path,
             for number, (whole, place) in enumerate(found + others, 1)]
 
 
-def _mesh_shape(mesh: UrdfMesh, how: str | None, folder: Path) -> tuple[Box | Mesh, Pose]:
-    """The shape for a mesh, one of MESHES, and its pose in the link's frame."""
+def _mesh_shapes(mesh: UrdfMesh, how: str | None,
+                 folder: Path) -> Iterator[tuple[Box | Mesh, Pose]]:
+    """The shapes for a mesh, of one of MESHES, and their poses in the link's frame."""
     if how is None:
         raise errors.WrongForm('mesh', mesh.file, f'{PRIMITIVES}; or `meshes: exact` for its '
-                               'triangles, `hull` for its convex hull, `box` for the box around it')
+                               'triangles, `hull` or `hulls` for its convex hull or several, `box` '
+                               'for the box around it')
     path = find_file(mesh.file, folder)
     if path is None:
         raise errors.Unreadable('mesh', mesh.file, 'a file beside this one or in a ROS package')
-    if how == 'box':
-        box, place = bounding_box(read_mesh(path, mesh.scale))
-        return box, mesh.pose.compose(place)
-    return (read_hull if how == 'hull' else read_surface)(path, mesh.scale), mesh.pose
+    try:
+        if how == 'box':
+            box, place = bounding_box(read_mesh(path, mesh.scale))
+            yield box, mesh.pose.compose(place)
+        elif how == 'hulls':
+            yield from ((hull, mesh.pose) for hull in read_hulls(path, mesh.scale))
+        else:
+            yield (read_hull if how == 'hull' else read_surface)(path, mesh.scale), mesh.pose
+    except ModelError as error:
+        raise error.at(f'mesh.({path.name})') from None
 
 
 def _placed(pose: Pose) -> dict[str, Any]:

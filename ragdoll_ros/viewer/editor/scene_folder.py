@@ -17,6 +17,7 @@ from ...files.config import config_folder, scene_names
 from ...files.robots.mesh_file import SUFFIXES, read_surface
 from ...files.robots.robot_bodies import PARSERS
 from ...files.scene import load_scene, save_scene, scene_from_data, scene_text
+from ...files.surfaces import HULLS
 from ...model import errors
 from ...model.mesh import SURFACES, Mesh
 from ...model.scene import Placement, Scene, all_above_ground
@@ -159,7 +160,7 @@ class SceneFolder:
                 raise errors.Unreadable('model', model, f'a file inside {self.path}').at(place)
 
     def _check_bodies(self, data: object) -> None:
-        """Raise Unreadable for robots, worlds and surfaces that are neither here nor in config/."""
+        """Raise Unreadable for robots, worlds and meshes that are neither here nor in config/."""
         for place, source in _files_of_bodies(data):
             is_shipped = source in {path.name for path in config_folder().iterdir()}
             if not is_shipped and not (self._is_inside(source) and (self.path / source).is_file()):
@@ -189,25 +190,32 @@ class SceneFolder:
 
 def _dolls_of(data: object) -> Iterator[tuple[str, object]]:
     """Path and value of each ``doll`` in parsed data that may be a scene."""
-    dolls = data.get('dolls') if isinstance(data, dict) else None
-    for index, entry in enumerate(dolls if isinstance(dolls, list) else ()):
-        if isinstance(entry, dict):
-            yield f'dolls[{index}].doll', entry.get('doll')
+    for place, entry in _listed(data, 'dolls'):
+        yield f'{place}.doll', entry.get('doll')
 
 
 def _files_of_bodies(data: object) -> Iterator[tuple[str, str]]:
-    """Path and value of each file of a body in parsed data that may be a scene."""
-    bodies = data.get('bodies') if isinstance(data, dict) else None
-    for index, entry in enumerate(bodies if isinstance(bodies, list) else ()):
-        if not isinstance(entry, dict):
-            continue
-        found = [(key, entry[key]) for key in PARSERS.keys() & entry.keys()]
-        shape = entry.get('shape')
-        for kind in SURFACES.keys() & shape.keys() if isinstance(shape, dict) else ():
-            if isinstance(shape[kind], dict):
-                found += [(f'shape.{kind}.{key}', value) for key, value in shape[kind].items()]
-        yield from ((f'bodies[{index}].{path}', value) for path, value in found
-                    if isinstance(value, str))
+    """Path and value of each file of a body or a bone in parsed data, of a scene or a doll."""
+    solids = [*_listed(data, 'bodies'), *_listed(data, 'bones')]
+    for place, doll in _dolls_of(data):
+        solids += [(f'{place}.{bone}', entry) for bone, entry in _listed(doll, 'bones')]
+    found: list[tuple[str, object]] = []
+    for place, entry in solids:
+        found += [(f'{place}.{key}', entry[key]) for key in PARSERS.keys() & entry.keys()]
+        for where, shape in [('shape', entry.get('shape')), *_listed(entry, 'shapes')]:
+            for kind in {*SURFACES, HULLS} & shape.keys() if isinstance(shape, dict) else ():
+                if isinstance(shape[kind], dict):
+                    found += [(f'{place}.{where}.{kind}.{key}', value)
+                              for key, value in shape[kind].items()]
+    yield from ((place, value) for place, value in found if isinstance(value, str))
+
+
+def _listed(data: object, key: str) -> Iterator[tuple[str, dict]]:
+    """Path and value of each mapping in a list of parsed data."""
+    values = data.get(key) if isinstance(data, dict) else None
+    for index, value in enumerate(values if isinstance(values, list) else ()):
+        if isinstance(value, dict):
+            yield f'{key}[{index}]', value
 
 
 def safe_name(name: str) -> str:
