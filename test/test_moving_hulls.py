@@ -301,7 +301,8 @@ def test_several_hulls_make_one_body(tmp_path):
 def test_a_robot_that_moves_has_no_triangles_of_their_own(tmp_path, arm):
     entry = ENTRY.replace('meshes: hull', 'meshes: exact')
     (tmp_path / 'link.stl').write_bytes(stl(np.eye(3)[None]))
-    assert '`meshes: hull`, `hulls` or `box`: no other moves' in refusal(tmp_path, entry, r_urdf=ARM)
+    said = refusal(tmp_path, entry, r_urdf=ARM)
+    assert '`meshes: hull`, `hulls` or `box`: no other moves' in said
 
 
 def stone(seed, count=14, size=0.15):

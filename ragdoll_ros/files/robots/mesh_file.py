@@ -147,26 +147,31 @@ def read_hull(path: Path, scale: tuple[float, ...] = UNSCALED) -> Hull:
 
 def convex_hull(points: np.ndarray, source: tuple | None = None) -> Hull:
     """The convex hull of points (p, 3) m, by Qhull. Raises Unreadable for what has no volume."""
-    spread = np.linalg.eigvalsh(np.cov(points.T))
-    if not spread[0] > FLAT ** 2 * spread[2]:
-        raise errors.Unreadable('', f'{len(points)} points', 'points around a volume')
-    try:
-        from trimesh.convex import convex_hull as hull_of
-    except ImportError:
-        raise errors.Unreadable('', f'{len(points)} points',
-                                "trimesh and scipy for a hull: pip install '.[fit]'") from None
     while True:
-        found = hull_of(points)
-        vertices, faces = np.asarray(found.vertices, float), np.asarray(found.faces)
-        needless = _apexes_of_thin(vertices, faces)
+        spread = np.linalg.eigvalsh(np.cov(points.T))
+        if not spread[0] > FLAT ** 2 * spread[2]:
+            raise errors.Unreadable('', f'{len(points)} points', 'points around a volume')
+        vertices, faces = _qhull(points)
+        needless = _nearly_on_edges(vertices, faces)
         if not len(needless):
             return Hull(vertices, faces, source)
         points = np.delete(vertices, needless, axis=0)
 
 
-def _apexes_of_thin(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Vertices on the longest edge of a triangle that has no normal, but for rounding: where points
-    are nearly on a line, Qhull makes such triangles.
+def _qhull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (v, 3) m and triangles (t, 3) of the convex hull of points (p, 3) m."""
+    try:
+        from trimesh.convex import convex_hull as hull_of
+        found = hull_of(points)
+    except ImportError:
+        raise errors.Unreadable('', f'{len(points)} points',
+                                "trimesh and scipy for a hull: pip install '.[fit]'") from None
+    return np.asarray(found.vertices, float), np.asarray(found.faces)
+
+
+def _nearly_on_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Indices of vertices that are nearly on the longest edge of their triangle, which so has no
+    normal. Qhull makes such triangles of points that rounding has moved off a line.
     """
     corners = vertices[faces]
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
