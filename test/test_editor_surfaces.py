@@ -174,6 +174,39 @@ def test_an_uploaded_mesh_stands_beside_the_doll(server, tmp_path):  # noqa: F81
     assert desk.editor.scene == DROP
 
 
+@pytest.mark.parametrize('mass', ['', 'mass: 2, '])
+def test_a_body_of_several_hulls_is_opened_moved_and_saved(server, tmp_path, mass):  # noqa: F811
+    """Two boxes, of which no hull is that of the mesh; the file is only read when it is opened."""
+    trimesh = pytest.importorskip('trimesh')
+    pytest.importorskip('vhacdx')
+    parts = [trimesh.creation.box((0.2, 0.2, 1)), trimesh.creation.box((1, 0.2, 0.2))]
+    parts[1].apply_translation((0.4, 0, -0.6))
+    trimesh.util.concatenate(parts).export(tmp_path / 'rock.stl')
+    desk = Desk(server, tmp_path)
+    text = ('dolls: [{doll: doll}]\nbodies: [{name: rock, position: [3, 0, 2], '
+            f'{mass}shape: {{hulls: {{file: rock.stl}}}}}}]')
+    desk.files.upload('scene.yaml', text.encode())
+    if mass:
+        desk.editor.select('rock/rock')
+    else:
+        desk.editor.select_static('rock')
+    before = desk.editor.scene
+    desk.editor.toggle()
+    drag(desk.editor.handles.body, (5, 4, 3))
+    (tmp_path / 'rock.stl').unlink()
+
+    old, new = (scene.dolls[1].doll.root if mass else scene.bodies[0]
+                for scene in (before, desk.editor.scene))
+    assert new == dataclasses.replace(old, position=new.position)
+    assert new.position == pytest.approx((5, 4, 3))
+    assert [part.kind for part in old.shape.parts].count('hull') == len(old.shape.parts) > 1
+    desk.files.name.value = 'rocks'
+    desk.files.save()
+    assert load_scene(str(tmp_path / 'rocks.yaml')) == desk.editor.scene
+    desk.editor.undo()
+    assert desk.editor.scene == before
+
+
 @pytest.mark.parametrize(('name', 'content'), [
     ('rock.stl', b'solid'), ('rock.obj', b''), ('rock.txt', b'x'),
     ('<b>.glb', b'glTF' + bytes(20))])
