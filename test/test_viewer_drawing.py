@@ -17,12 +17,13 @@ from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.fit.skin import skin_of
 from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.plane import Plane
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene, above_ground
-from ragdoll_ros.model.shapes import Box, Sphere
+from ragdoll_ros.model.shapes import Box, Part, Sphere
 from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
 from ragdoll_ros.model.static_body import StaticBody
@@ -71,7 +72,13 @@ def test_a_mesh_is_closed_seen_from_outside_and_of_size_one(meshes, kind, volume
     assert there == {(b, a) for a, b in there}
 
 
-@pytest.mark.parametrize('shape', [*SPECIMENS.values(), OCTAHEDRON], ids=[*SPECIMENS, 'hull'])
+HULLS = Compound((*OCTAHEDRON.parts,
+                  Part(OCTAHEDRON.parts[0].shape, (0.3, 0.1, 0), (0, 0.6, 0, 0.8))))
+HULLS = HULLS.in_frame(HULLS.principal_pose())
+
+
+@pytest.mark.parametrize('shape', [*SPECIMENS.values(), OCTAHEDRON, HULLS],
+                         ids=[*SPECIMENS, 'hull', 'hulls'])
 def test_what_is_drawn_of_a_bone_reaches_as_far_as_its_shape(shape):
     """Along any direction; flat faces of balls lack 1.7 % of a radius of 0.2 m."""
     import viser
@@ -82,7 +89,9 @@ def test_what_is_drawn_of_a_bone_reaches_as_far_as_its_shape(shape):
     state = State(rng.normal(size=(1, 3)), rotation.normalized(rng.normal(size=(1, 4))),
                   *np.zeros((2, 1, 3)))
     points = []
-    for batch in Bodies(server, scene, state).batches:
+    batches = Bodies(server, scene, state).batches
+    assert len(batches) == len({part.kind for part in bone.shape.primitives})
+    for batch in batches:
         vertices = batch.handle.vertices
         for place, wxyz, scale in zip(batch.handle.batched_positions, batch.handle.batched_wxyzs,
                                       batch.handle.batched_scales, strict=True):
@@ -434,6 +443,19 @@ def test_a_plane_is_drawn_from_above_alone():
                       vertices[faces[:, 2]] - vertices[faces[:, 0]])
     assert mesh.side == 'front' and not mesh.cast_shadow
     assert (normal[:, 2] > 0).all() and not normal[:, :2].any() and not vertices[:, 2].any()
+
+
+def test_the_hulls_of_a_static_body_are_drawn_as_one_mesh():
+    import viser
+    rock = StaticBody('rock', HULLS, (1.0, 0.0, 0.5), (0.0, 0.1, 0.3, 1.0))
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    draw_static_bodies(server, dataclasses.replace(load_scene('drop'), bodies=(rock,)))
+    mesh = server.scene.get_handle_by_name('/scene/static/hulls_0')
+    server.stop()
+    drawn = mesh.position + rotation.rotate(mesh.wxyz[[1, 2, 3, 0]], mesh.vertices)
+    own = [part.pose.apply(part.shape.vertices) for part in rock.parts]
+    # Sent as floats of 32 bits.
+    np.testing.assert_allclose(drawn, np.concatenate(own), atol=1e-6)
 
 
 def test_a_ball_at_each_joint_reaches_into_both_bones():

@@ -1,5 +1,5 @@
-"""The bones, as instanced meshes: parts of one shape form batches, so that many cost little. A hull
-is a batch by itself.
+"""The bones, as instanced meshes: parts of one shape form batches, so that many cost little. The
+hulls of a bone are a batch.
 
 A batch in which nothing has moved is not sent: among a thousand resting dolls one that moves costs
 only the batches that it is in.
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
+from ...model.compound import Compound
 from ...model.mesh import Hull
 from ...model.pose import Pose
 from ...model.ragdoll import DEFAULT_COLOR
@@ -21,7 +22,7 @@ from ...model.shapes import Part
 from ...model.state import State
 from ..viser_internals import set_poses
 from .joint_balls import joint_balls
-from .meshes import COARSE, MESHES, faceted
+from .meshes import COARSE, MESHES, Mesh, faceted
 
 OPACITY = 0.45
 """Of bones below a visible skin."""
@@ -63,11 +64,14 @@ class Bodies:
                  for part in bone.shape.primitives]
         self._meshes = MESHES if len(parts) <= CROWD else COARSE
         colors = np.array([(bone.color or DEFAULT_COLOR)[:3] for bone in scene.bones])
-        for index, part in parts:
-            if isinstance(part.shape, Hull):
-                self.batches.append(self._batch(
-                    f'/scene/bodies/hull_{len(self.batches)}', [(index, part)], index in skinned,
-                    colors[[index]], state))
+        for index, hulls in itertools.groupby(
+                ((index, part) for index, part in parts if isinstance(part.shape, Hull)),
+                key=lambda pair: pair[0]):
+            # A bone may have many, which move as one.
+            joined = Compound(tuple(part for _, part in hulls))
+            self.batches.append(self._batch(
+                f'/scene/bodies/hulls_{index}', [(index, Part(joined.parts[0].shape))],
+                index in skinned, colors[[index]], state, faceted(*joined.mesh())))
         for kind, below_skin in itertools.product(MESHES, (False, True)):
             selected = [(index, part) for index, part in parts
                         if part.kind == kind and (index in skinned) == below_skin]
@@ -86,8 +90,10 @@ class Bodies:
                     colors[[child for _, child, _ in chosen]], state))
 
     def _batch(self, name: str, chunk: list[tuple[int, Part]], skinned: bool, colors: np.ndarray,
-               state: State) -> Batch:
-        """A batch of parts of one shape, each with the index of its bone, in ``colors`` (p, 3)."""
+               state: State, mesh: Mesh | None = None) -> Batch:
+        """A batch of parts of one shape, each with the index of its bone, in ``colors`` (p, 3); of
+        hulls ``mesh`` is what is drawn.
+        """
         bones = np.array([index for index, _ in chunk])
         parts = [part for _, part in chunk]
         kind = parts[0].kind
@@ -95,12 +101,9 @@ class Bodies:
             np.array([part.position for part in parts]),
             np.array([part.orientation for part in parts]))
         positions, wxyzs = _part_poses(state, bones, local_pose)
-        mesh, scales = self._meshes.get(kind), np.array([part.size for part in parts])
-        if isinstance(parts[0].shape, Hull):
-            mesh, scales = faceted(*parts[0].shape.mesh()), np.ones((1, 3))
-        assert mesh
+        scales = np.ones((1, 3)) if mesh else np.array([part.size for part in parts])
         handle = self._server.scene.add_batched_meshes_simple(
-            name, *mesh, wxyzs, positions, batched_scales=scales,
+            name, *(mesh or self._meshes[kind]), wxyzs, positions, batched_scales=scales,
             batched_colors=np.round(linear(colors) * 255).astype(np.uint8), lod='off')
         return Batch(kind, skinned, handle, bones, local_pose)
 

@@ -7,6 +7,7 @@ import numpy as np
 import viser
 
 from ...model import rotation
+from ...model.compound import Compound
 from ...model.mesh import Hull
 from ...model.plane import Plane
 from ...model.scene import Scene
@@ -119,14 +120,14 @@ def draw_static_bodies(server: viser.ViserServer, scene: Scene) -> None:
                 batched_scales=np.array([part.size for part in own]),
                 batched_colors=np.round(linear(np.array(colors)) * 255).astype(np.uint8),
                 lod='off')
-    for number, (part, color) in enumerate(parts):
-        if isinstance(part.shape, Hull):
-            vertices, faces = part.shape.mesh()
-            server.scene.add_mesh_simple(
-                f'/scene/static/hull_{number}', vertices.astype(np.float32),
-                faces.astype(np.uint32), color=color[:3], flat_shading=True,
-                wxyz=np.array(part.orientation)[WXYZ], position=part.position)
     for index, body in enumerate(scene.bodies):
+        hulls = tuple(part for part in body.shape.primitives if isinstance(part.shape, Hull))
+        if hulls:
+            vertices, faces = Compound(hulls).mesh()
+            server.scene.add_mesh_simple(
+                f'/scene/static/hulls_{index}', vertices.astype(np.float32),
+                faces.astype(np.uint32), color=(body.color or DEFAULT_COLOR)[:3],
+                flat_shading=True, wxyz=np.array(body.orientation)[WXYZ], position=body.position)
         if not body.shape.primitives:
             red, green, blue = (body.color or DEFAULT_COLOR)[:3]
             vertices, faces = body.shape.mesh()
