@@ -136,29 +136,38 @@ def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
     number = clip_polygon(corners, count, n, polygon, number, points)
     normal = face_normal(reference, face)
     origin, cosine = vec(corners[0].point), dot(normal, n)
-    faces = ((6 if sign > 0 else 0) + face) * 6 + incident_face
     has_hull = incident.kind == HULL or reference.kind == HULL
-    if has_hull:
-        faces = ((MAX_FACES if sign > 0 else 0) + face % MAX_FACES) * MAX_FACES + (
-            incident_face % MAX_FACES)
     for i in range(number):
         vertex, side = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
         height = dot(normal, sub(vec(vertex.point), origin)) / cosine
         put(points[i].point, add_scaled(
             add(reference.position, vec(vertex.point)), -(height / 2), n))
         points[i].gap = sign * height
-        points[i].feature_id = (
-            faces * 2 * MAX_CORNERS + side) * 2 * MAX_CORNERS + vertex.feature_id
-        if has_hull:
-            points[i].feature_id += FIRST_HULL_ID
-        if side < MAX_CORNERS and vertex.feature_id < MAX_CORNERS:
-            corner = vertex.feature_id
-            points[i].feature_id = CORNER_IDS + faces // 6 * MAX_CORNERS + corner
-            if has_hull:
-                corner = names[corner].feature_id if incident.kind == HULL else corner
-                points[i].feature_id = HULL_CORNER_IDS + (
-                    faces // MAX_FACES * MAX_VERTICES + corner % MAX_VERTICES)
+        corner = vertex.feature_id
+        if incident.kind == HULL and corner < MAX_CORNERS:
+            corner = names[corner].feature_id
+        points[i].feature_id = _feature_id(
+            has_hull, face, incident_face, 1 if sign > 0 else 0, side, vertex.feature_id, corner)
     return number
+
+
+@compiled
+def _feature_id(has_hull: bool, face: int, incident_face: int, of_b: int, side: int, end: int,
+                corner: int) -> int:
+    """Id of a point on the reference face, which is b's where ``of_b`` is 1: of the faces and of
+    the sides before and after it, or where both are the incident face's of its corner.
+    """
+    is_corner = side < MAX_CORNERS and end < MAX_CORNERS
+    if not has_hull:
+        face += 6 * of_b
+        if is_corner:
+            return CORNER_IDS + face * MAX_CORNERS + corner
+        return ((face * 6 + incident_face) * 2 * MAX_CORNERS + side) * 2 * MAX_CORNERS + end
+    face = face % MAX_FACES + MAX_FACES * of_b
+    if is_corner:
+        return HULL_CORNER_IDS + face * MAX_VERTICES + corner % MAX_VERTICES
+    faces = face * MAX_FACES + incident_face % MAX_FACES
+    return FIRST_HULL_ID + (faces * 2 * MAX_CORNERS + side) * 2 * MAX_CORNERS + end
 
 
 @compiled
