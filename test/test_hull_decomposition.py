@@ -238,6 +238,22 @@ def test_a_mesh_of_overlapping_boxes_is_split(tmp_path):
     assert sum(hull.volume for hull in hulls) == pytest.approx(3, abs=3 * 2 / VOXELS)
 
 
+def test_surfaces_that_touch_are_a_hull_each(tmp_path):
+    """A table of five boxes: exactly they, without V-HACD."""
+    boxes = [((-.5, -.3, .7), (.5, .3, .75)), *(((x, y, 0), (x + .05, y + .05, .7))
+                                                for x in (-.5, .45) for y in (-.3, .25))]
+    parts = []
+    for lower, upper in boxes:
+        parts.append(trimesh.creation.box(np.subtract(upper, lower)))
+        parts[-1].apply_translation(np.add(lower, upper) / 2)
+    hulls = read_hulls(written(trimesh.util.concatenate(parts), tmp_path))
+    assert len(hulls) == 5
+    found = sorted(np.concatenate([hull.vertices.min(axis=0), hull.vertices.max(axis=0)]).tolist()
+                   for hull in hulls)
+    np.testing.assert_allclose(found, sorted(np.ravel(box).tolist() for box in boxes), atol=1e-7)
+    assert sum(hull.volume for hull in hulls) == pytest.approx(.03 + 4 * .7 * .05 ** 2, rel=1e-6)
+
+
 def test_an_open_mesh_is_its_walls(tmp_path):
     """Which get the thickness of a voxel: a ball lies on the floor of a bucket."""
     written(bucket(), tmp_path)

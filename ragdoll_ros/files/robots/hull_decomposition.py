@@ -1,4 +1,5 @@
-"""The hulls of a mesh file: one where it fits, else several, by V-HACD from the extra `fit`.
+"""The hulls of a mesh file: one where it fits, else one of each of its closed surfaces where those
+fit, else several by V-HACD from the extra `fit`.
 
 Mamou, Volumetric Hierarchical Approximate Convex Decomposition, in Game Engine Gems 3, 2016: the
 mesh is filled with voxels, which are split by planes until each piece is nearly convex, and merged
@@ -22,6 +23,9 @@ MOST_HULLS, MOST_VERTICES = 16, 32
 RESOLUTION = 100_000
 """Voxels: 66 along the longest edge of the bounding box. With 400 000, 104, and 3 times as slow."""
 
+TOUCHING = 1e-5
+"""Of the size of the largest hull: what overlaps by less has met in rounding."""
+
 SPLIT_ABOVE = 1.0
 """%: a hull that has so much more volume than its voxels is split."""
 
@@ -37,9 +41,53 @@ def read_hulls(path: Path, scale: tuple[float, ...] = UNSCALED) -> tuple[Hull, .
     # The comparison is false for a mesh that is no closed surface.
     if whole.volume <= FITS * enclosed_volume(mesh):
         return (whole,)
-    parts = _decomposed(mesh)
+    parts = _hulls_of_shells(mesh) or _decomposed(mesh)
     # Where they have nearly its volume, they fit no better.
     return parts if whole.volume > FITS * sum(part.volume for part in parts) > 0 else (whole,)
+
+
+@functools.lru_cache(maxsize=64)
+def _hulls_of_shells(mesh: Mesh) -> tuple[Hull, ...]:
+    """The hull of each closed surface of a mesh of several, exactly; none where one does not fit,
+    or where two may overlap, by their bounding boxes: overlaps would count twice.
+    """
+    shells = _shells(mesh)
+    if not 1 < shells.max() + 1 <= MOST_HULLS:
+        return ()
+    hulls = []
+    for shell in range(shells.max() + 1):
+        used, faces = np.unique(mesh.faces[shells == shell], return_inverse=True)
+        surface = Mesh(mesh.vertices[used], faces.reshape(-1, 3))
+        hull = _hull(surface.vertices)
+        if hull is None or not hull.volume <= FITS * enclosed_volume(surface):
+            return ()
+        hulls.append(hull)
+    return () if _may_overlap(hulls) else tuple(hulls)
+
+
+def _shells(mesh: Mesh) -> np.ndarray:
+    """Index (t,) of the surface of each face: faces are of one where they alone have an edge in
+    common. Those that touch may have vertices and edges at the same place.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    edges = np.sort(mesh.faces[:, (0, 1, 1, 2, 2, 0)].reshape(-1, 2), axis=1)
+    _, edge, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    edge = edge.ravel()
+    order = np.argsort(edge, kind='stable')
+    pairs = (order[count[edge[order]] == 2] // 3).reshape(-1, 2).T
+    size = len(mesh.faces)
+    return connected_components(coo_matrix((np.ones(len(pairs[0])), pairs), (size, size)),
+                                directed=False)[1]
+
+
+def _may_overlap(hulls: list[Hull]) -> bool:
+    """Whether the bounding boxes of two hulls have more than TOUCHING of a length in common."""
+    lower, upper = (np.array([hull.bounds[side] for hull in hulls]) for side in range(2))
+    common = np.minimum(upper[:, None], upper) - np.maximum(lower[:, None], lower)
+    allowed = TOUCHING * (upper - lower).max()
+    return bool((common > allowed).all(axis=2)[np.triu_indices(len(hulls), 1)].any())
 
 
 @functools.lru_cache(maxsize=64)
