@@ -69,17 +69,14 @@ def _shells(mesh: Mesh) -> np.ndarray:
     """Index (t,) of the surface of each face: faces are of one where they alone have an edge in
     common. Those that touch may have vertices and edges at the same place.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+    import trimesh
 
     edges = np.sort(mesh.faces[:, (0, 1, 1, 2, 2, 0)].reshape(-1, 2), axis=1)
     _, edge, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     edge = edge.ravel()
     order = np.argsort(edge, kind='stable')
-    pairs = (order[count[edge[order]] == 2] // 3).reshape(-1, 2).T
-    size = len(mesh.faces)
-    return connected_components(coo_matrix((np.ones(len(pairs[0])), pairs), (size, size)),
-                                directed=False)[1]
+    pairs = (order[count[edge[order]] == 2] // 3).reshape(-1, 2)
+    return trimesh.graph.connected_component_labels(pairs, node_count=len(mesh.faces))
 
 
 def _may_overlap(hulls: list[Hull]) -> bool:
