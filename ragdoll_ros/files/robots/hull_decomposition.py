@@ -12,7 +12,7 @@ import numpy as np
 
 from ...model import errors
 from ...model.mesh import Hull, Mesh
-from .mesh_file import UNSCALED, convex_hull, enclosed_volume, read_surface
+from .mesh_file import UNSCALED, convex_hull, enclosed_volume, read_surface, shells_of
 
 FITS = 1.05
 """Volume of one hull over that of the mesh up to which it stands for the mesh."""
@@ -51,7 +51,7 @@ def _hulls_of_shells(mesh: Mesh) -> tuple[Hull, ...]:
     """The hull of each closed surface of a mesh of several, exactly; none where one does not fit,
     or where two may overlap, by their bounding boxes: overlaps would count twice.
     """
-    shells = _shells(mesh)
+    shells = shells_of(mesh)
     if not 1 < shells.max() + 1 <= MOST_HULLS:
         return ()
     hulls = []
@@ -63,20 +63,6 @@ def _hulls_of_shells(mesh: Mesh) -> tuple[Hull, ...]:
             return ()
         hulls.append(hull)
     return () if _may_overlap(hulls) else tuple(hulls)
-
-
-def _shells(mesh: Mesh) -> np.ndarray:
-    """Index (t,) of the surface of each face: faces are of one where they alone have an edge in
-    common. Those that touch may have vertices and edges at the same place.
-    """
-    import trimesh
-
-    edges = np.sort(mesh.faces[:, (0, 1, 1, 2, 2, 0)].reshape(-1, 2), axis=1)
-    _, edge, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    edge = edge.ravel()
-    order = np.argsort(edge, kind='stable')
-    pairs = (order[count[edge[order]] == 2] // 3).reshape(-1, 2)
-    return trimesh.graph.connected_component_labels(pairs, node_count=len(mesh.faces))
 
 
 def _may_overlap(hulls: list[Hull]) -> bool:

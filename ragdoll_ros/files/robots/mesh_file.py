@@ -193,6 +193,20 @@ def enclosed_volume(mesh: Mesh) -> float:
         return float(solid.volume) if solid.is_volume and solid.body_count == 1 else math.nan
 
 
+def shells_of(mesh: Mesh) -> np.ndarray:
+    """Index (t,) of the surface of each face: faces are of one where they alone have an edge in
+    common. Those that touch may have vertices and edges at the same place. Needs trimesh and scipy.
+    """
+    import trimesh
+
+    edges = np.sort(mesh.faces[:, (0, 1, 1, 2, 2, 0)].reshape(-1, 2), axis=1)
+    _, edge, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    edge = edge.ravel()
+    order = np.argsort(edge, kind='stable')
+    pairs = (order[count[edge[order]] == 2] // 3).reshape(-1, 2)
+    return trimesh.graph.connected_component_labels(pairs, node_count=len(mesh.faces))
+
+
 def bounding_box(triangles: np.ndarray) -> tuple[Box, Pose]:
     """The smaller of two boxes around triangles (t, 3, 3) m, along the mesh's own axes and along
     the principal axes of its vertices, and its pose in the mesh's frame.
