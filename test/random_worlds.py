@@ -157,8 +157,8 @@ class Figures:
     """rad: farthest that a joint was past a limit."""
     overlaps: bool
     """Whether the doll begins in something: such a world is none."""
-    sleeps: bool
-    """Whether all sleeps at the end."""
+    speed: float
+    """m/s of the fastest bone at the end, 0 if all sleeps."""
     cost: float
     """s of CPU time."""
 
@@ -181,16 +181,18 @@ def fall(scene: Scene, accuracy: str = 'normal', seconds: float = SECONDS) -> Fi
                 break
             state = simulation.advance()
             if not np.isfinite(state.rows).all():
-                return Figures(math.inf, deepest, where, math.inf, math.inf, overlaps, False, 0)
+                return Figures(math.inf, deepest, where, math.inf, math.inf, overlaps, math.inf, 0)
             if tick % EVERY == 0:
                 depth, body = deepest_in_bodies(scene, state)
                 if depth > deepest:
                     deepest, where = depth, f'{body} at {tick / 100:.2f} s'
                 overshoot = max(overshoot, simulation.measures()['limit_overshoot_rad'])
-        excess, sleeps = simulation.measures()['energy_excess_J'], simulation.asleep
+        excess = simulation.measures()['energy_excess_J']
+        speed = 0.0 if simulation.asleep else float(
+            np.linalg.norm(state.rows[:, 7:10], axis=1).max())
     own = scene.dolls[0].doll.mass * 9.8
     return Figures(excess / own, deepest, where, deepest_in_bodies(scene, state)[0],
-                   overshoot, overlaps, sleeps, time.process_time() - begin)
+                   overshoot, overlaps, speed, time.process_time() - begin)
 
 
 def deepest_in_bodies(scene: Scene, state) -> tuple[float, str]:
@@ -264,7 +266,10 @@ def main() -> int:
             found = fall(thrown(load_scene(options.scene), number), options.accuracy, AT_REST_BY)
         else:
             found = fall(world(number), options.accuracy)
-        awake, longest = awake + (not found.sleeps), max(longest, found.cost)
+        longest = max(longest, found.cost)
+        if options.scene and found.speed:
+            awake += 1
+            print(f'{number} is awake: {1e3 * found.speed:.2g} mm/s')
         if found.is_bad:
             bad += 1
             print(number, found)
@@ -277,8 +282,9 @@ def main() -> int:
             excess = max(excess, found.excess)
     print(f'{bad} bad; {good} good, at most {1e3 * deepest:.3f} mm deep, '
           f'{math.degrees(overshoot):.3f} degrees past a limit, {excess:.1e} of the energy from '
-          f'nothing; {overlapping} began in a body; {awake} awake at the end; at most '
-          f'{longest:.1f} s of CPU time')
+          f'nothing; {overlapping} began in a body; '
+          + (f'{awake} awake at the end; ' if options.scene else '')
+          + f'at most {longest:.1f} s of CPU time')
     return bad > 0
 
 
