@@ -9,25 +9,26 @@ import numpy as np
 from ....model.mesh import Hull
 from ....model.pose import Pose
 from ...kernels.collision.shapes import HULL
-from ...kernels.system import GEOM, HULL_EDGE, HULL_FACE, HULL_TABLE
+from ...kernels.system import GEOM, HULL_EDGE, HULL_FACE, HULL_TABLE, HULL_VERTEX
 
 ONE_PLANE = 1e-9
 """Difference of normals, and of distances over the hull's size, up to which faces are one."""
 
 
 class HullTables(NamedTuple):
-    """Fields of a System of the same names: vertices (k, 3) m, HULL_FACE (t,), HULL_EDGE (e,) and
-    HULL_TABLE (h,).
+    """Fields of a System of the same names: HULL_VERTEX (k,), HULL_FACE (t,), HULL_EDGE (e,),
+    neighbors (m,) and HULL_TABLE (h,).
     """
 
-    vertices: np.ndarray
+    hull_vertices: np.ndarray
     hull_faces: np.ndarray
     hull_edges: np.ndarray
+    hull_neighbors: np.ndarray
     hulls: np.ndarray
 
 
-NO_HULLS = HullTables(np.zeros((0, 3)), np.zeros(0, HULL_FACE), np.zeros(0, HULL_EDGE),
-                      np.zeros(0, HULL_TABLE))
+NO_HULLS = HullTables(np.zeros(0, HULL_VERTEX), np.zeros(0, HULL_FACE), np.zeros(0, HULL_EDGE),
+                      np.zeros(0, np.int64), np.zeros(0, HULL_TABLE))
 
 
 def hull_tables(hull: Hull) -> HullTables:
@@ -48,7 +49,13 @@ def hull_tables(hull: Hull) -> HullTables:
     table = np.zeros(1, HULL_TABLE)
     table['vertex_count'], table['face_count'] = len(vertices), count
     table['triangle_count'], table['edge_count'], table['size'] = len(faces), len(edges), radius
-    return HullTables(vertices, faces, edges, table)
+    table['extremes'] = np.stack([vertices.argmax(axis=0), vertices.argmin(axis=0)], axis=1).ravel()
+    ends = np.concatenate([faces['corners'], np.roll(faces['corners'], -1, axis=1)], axis=1)
+    begin, end = np.unique(ends[:, [0, 3, 1, 4, 2, 5]].reshape(-1, 2), axis=0).T
+    records = np.zeros(len(vertices), HULL_VERTEX)
+    records['point'], records['neighbor_count'] = vertices, np.bincount(begin)
+    records['first_neighbor'] = np.cumsum(records['neighbor_count']) - records['neighbor_count']
+    return HullTables(records, faces, edges, np.ascontiguousarray(end), table)
 
 
 def hull_geom(hull: Hull, pose: Pose) -> np.ndarray:
@@ -64,16 +71,17 @@ def hull_geom(hull: Hull, pose: Pose) -> np.ndarray:
 
 def join_hulls(parts: Sequence[HullTables]) -> HullTables:
     """Concatenate tables: the hulls of each follow those of the one before."""
-    vertices = faces = edges = 0
+    vertices = faces = edges = neighbors = 0
     moved = []
     for part in parts:
         table = part.hulls.copy()
         table['first_vertex'] += vertices
         table['first_face'] += faces
         table['first_edge'] += edges
+        table['first_neighbor'] += neighbors
         moved.append(table)
-        vertices, faces = vertices + len(part.vertices), faces + len(part.hull_faces)
-        edges += len(part.hull_edges)
+        vertices, faces = vertices + len(part.hull_vertices), faces + len(part.hull_faces)
+        edges, neighbors = edges + len(part.hull_edges), neighbors + len(part.hull_neighbors)
     return HullTables(*(np.concatenate(each) for each in zip(*(
         part[:-1] for part in parts), strict=True)), np.concatenate(moved))
 

@@ -202,7 +202,7 @@ def ground_gaps(s: System, geom: np.record, position: np.ndarray, r: np.ndarray,
                               + (c if k & 4 else -c))
     elif geom.kind == HULL:
         for k in range(geom.point_count):
-            vertex = vec(s.vertices[s.hulls[geom.hull].first_vertex + k])
+            vertex = vec(s.hull_vertices[s.hulls[geom.hull].first_vertex + k].point)
             out[first + k] = high + dot(vertex, (a, b, c))
     else:
         low = size[0] * math.sqrt(max(0.0, 1 - c * c))
@@ -237,7 +237,7 @@ def ground_point(s: System, geom: np.record, k: int, position: np.ndarray, r: np
         x, y, z = (size[0] if k & 1 else -size[0], size[1] if k & 2 else -size[1],
                    size[2] if k & 4 else -size[2])
     elif geom.kind == HULL:
-        x, y, z = vec(s.vertices[s.hulls[geom.hull].first_vertex + k])
+        x, y, z = vec(s.hull_vertices[s.hulls[geom.hull].first_vertex + k].point)
     else:
         z, k = (size[1] if k >= 5 else -size[1]), k % 5
         if k == 0:

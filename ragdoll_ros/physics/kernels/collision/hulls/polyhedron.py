@@ -35,17 +35,27 @@ INSIDE = 1e-12
 def hull_support(system: int, hull: int, d: Vec3) -> Vec3:
     """The vertex, m, that is farthest along d."""
     s = system_at(system)
-    return vec(s.vertices[supporting_vertex(s, hull, d)])
+    return vec(s.hull_vertices[supporting_vertex(s, hull, d)].point)
 
 
 @compiled
 def supporting_vertex(s: System, hull: int, d: Vec3) -> int:
-    """Index in System.vertices of the vertex that is farthest along d."""
-    first, best, most = s.hulls[hull].first_vertex, s.hulls[hull].first_vertex, -math.inf
-    for i in range(first, first + s.hulls[hull].vertex_count):
-        found = dot(vec(s.vertices[i]), d)
-        if found > most:
-            most, best = found, i
+    """Index in System.hull_vertices of the vertex that is farthest along d: by steps to the best
+    neighbor, from one that is farthest along an axis. On a convex surface none ends before.
+    """
+    table = s.hulls[hull]
+    first, axis = table.first_vertex, 0 if abs(d[0]) > abs(d[1]) else 1
+    axis = axis if abs(d[axis]) > abs(d[2]) else 2
+    best = first + table.extremes[2 * axis + (0 if d[axis] > 0 else 1)]
+    most, before = dot(vec(s.hull_vertices[best].point), d), np.int64(-1)
+    while best != before:
+        before, vertex = best, s.hull_vertices[best]
+        begin = table.first_neighbor + vertex.first_neighbor
+        for k in range(begin, begin + vertex.neighbor_count):
+            other = first + s.hull_neighbors[k]
+            found = dot(vec(s.hull_vertices[other].point), d)
+            if found > most:
+                most, best = found, other
     return best
 
 
@@ -61,7 +71,8 @@ def edge_vector(system: int, hull: int, edge: int) -> Vec3:
     """From one corner of an edge to the other, m."""
     s = system_at(system)
     first, corners = s.hulls[hull].first_vertex, s.hull_edges[edge].corners
-    return sub(vec(s.vertices[first + corners[1]]), vec(s.vertices[first + corners[0]]))
+    return sub(vec(s.hull_vertices[first + corners[1]].point),
+               vec(s.hull_vertices[first + corners[0]].point))
 
 
 @compiled
@@ -103,8 +114,8 @@ def _triangle_distance(s: System, first: int, face: int, p: Vec3, normal: Vec3,
     least, nearest, is_inside = math.inf, p, True
     corners = s.hull_faces[face].corners
     for k in range(3):
-        a = vec(s.vertices[first + corners[k]])
-        edge = sub(vec(s.vertices[first + corners[(k + 1) % 3]]), a)
+        a = vec(s.hull_vertices[first + corners[k]].point)
+        edge = sub(vec(s.hull_vertices[first + corners[(k + 1) % 3]].point), a)
         arm = sub(p, a)
         if dot(cross(edge, normal), arm) <= 0:
             continue
@@ -147,6 +158,13 @@ def hull_plane(system: int, face: int) -> tuple[Vec3, float]:
 
 
 @compiled
+def height_above(system: int, face: int, p: Vec3) -> float:
+    """How far, m, a point is above the plane of a face."""
+    s = system_at(system)
+    return dot(vec(s.hull_faces[face].normal), p) - s.hull_faces[face].offset
+
+
+@compiled
 def face_polygon(system: int, hull: int, face: int, corners: np.ndarray) -> int:
     """Write at most 8 corners of a face, those farthest along eight directions, anticlockwise from
     outside, to ``corners`` of CLIP_VERTEX; their feature ids are indices of vertices in the hull.
@@ -155,23 +173,26 @@ def face_polygon(system: int, hull: int, face: int, corners: np.ndarray) -> int:
     s = system_at(system)
     first, count = s.hulls[hull].first_vertex, 0
     triangle, normal = s.hull_faces[face], vec(s.hull_faces[face].normal)
-    x = sub(vec(s.vertices[first + triangle.corners[1]]),
-            vec(s.vertices[first + triangle.corners[0]]))
+    x = sub(vec(s.hull_vertices[first + triangle.corners[1]].point),
+            vec(s.hull_vertices[first + triangle.corners[0]].point))
     x = divide(x, norm(x))
     y, bottom = cross(normal, x), triangle.offset - ON_PLANE * s.hulls[hull].size
     for k in range(len(DIRECTIONS)):
-        d = add(scale(DIRECTIONS[k, 0], x), scale(DIRECTIONS[k, 1], y))
-        best, most = -1, -math.inf
-        for i in range(first, first + s.hulls[hull].vertex_count):
-            vertex = vec(s.vertices[i])
-            if dot(vertex, normal) < bottom:
-                continue
-            found = dot(vertex, d)
-            if found > most:
-                best, most = i - first, found
+        corners[k].gap = -math.inf
+    for i in range(s.hulls[hull].vertex_count):
+        vertex = vec(s.hull_vertices[first + i].point)
+        if dot(vertex, normal) < bottom:
+            continue
+        u, v = dot(vertex, x), dot(vertex, y)
+        for k in range(len(DIRECTIONS)):
+            found = DIRECTIONS[k, 0] * u + DIRECTIONS[k, 1] * v
+            if found > corners[k].gap:
+                corners[k].gap, corners[k].feature_id = found, i
+    for k in range(len(DIRECTIONS)):
+        best = corners[k].feature_id
         if count and (best == corners[count - 1].feature_id or best == corners[0].feature_id):
             continue
-        put(corners[count].point, vec(s.vertices[first + best]))
+        put(corners[count].point, vec(s.hull_vertices[first + best].point))
         corners[count].feature_id = best
         count += 1
     return count
@@ -184,13 +205,13 @@ def supporting_hull_edge(system: int, hull: int, d: Vec3) -> tuple[Vec3, Vec3]:
     """
     s = system_at(system)
     top, begin = supporting_vertex(s, hull, d), s.hulls[hull].first_vertex
-    least, half, corner = FEATURE_SINE, (0.0, 0.0, 0.0), vec(s.vertices[top])
+    least, half, corner = FEATURE_SINE, (0.0, 0.0, 0.0), vec(s.hull_vertices[top].point)
     first, end = hull_edges(system, hull)
     for i in range(first, end):
         for k in range(2):
             if begin + s.hull_edges[i].corners[k] != top:
                 continue
-            edge = sub(vec(s.vertices[begin + s.hull_edges[i].corners[1 - k]]), corner)
+            edge = sub(vec(s.hull_vertices[begin + s.hull_edges[i].corners[1 - k]].point), corner)
             sine = abs(dot(edge, d)) / norm(edge)
             if sine < least:
                 least, half = sine, scale(0.5, edge)
