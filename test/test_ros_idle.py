@@ -40,7 +40,7 @@ def test_a_sleeper_that_nobody_hears_wakes_for_every_second_tick(asleep, peer):
     ticks_for_a_wake(asleep, peer)
     # A busy machine makes more of them at once, and so does one that does not doze.
     assert ticks_for_a_wake(asleep, peer) > 0.8 * IDLE_TICKS
-    assert asleep._ticker._timer.timer_period_ns == IDLE_TICKS * TICK
+    assert asleep.ticker._timer.timer_period_ns == IDLE_TICKS * TICK
 
 
 def test_who_listens_hears_every_tick_on_time(asleep, peer):
@@ -50,14 +50,14 @@ def test_who_listens_hears_every_tick_on_time(asleep, peer):
     stamps = [message.header.stamp.sec * 10 ** 9 + message.header.stamp.nanosec
               for _, message in got]
     assert np.median(np.diff(stamps)) == TICK
-    assert asleep._ticker._timer.timer_period_ns == TICK
+    assert asleep.ticker._timer.timer_period_ns == TICK
 
 
 def test_a_push_wakes_it(asleep, peer):
     ticks_for_a_wake(asleep, peer)
     asleep.inputs.on_force(Wrench(force=Vector3(z=2000.0)))
     peer.wait(lambda: asleep.simulation.state.linear_velocities[0, 2] > 1)
-    assert asleep._ticker._timer.timer_period_ns == TICK
+    assert asleep.ticker._timer.timer_period_ns == TICK
 
 
 @pytest.mark.slow

@@ -316,7 +316,7 @@ def test_after_stalls_no_stamp_lies_in_the_future(make_node, peer, rate):
     stamps lay up to half a period ahead until the next one.
     """
     node, ahead = make_node(scene='flight', rate=rate), []
-    make_tick = node._ticker._tick
+    make_tick = node.ticker._tick
 
     def tick(due):
         ahead.append(due - time.monotonic_ns())
@@ -324,7 +324,7 @@ def test_after_stalls_no_stamp_lies_in_the_future(make_node, peer, rate):
         if len(ahead) % 8 == 0 and len(ahead) <= 32:
             time.sleep(0.52 + 0.23 * len(ahead) / 8 / rate)  # the stall
 
-    node._ticker._tick = tick
+    node.ticker._tick = tick
     peer.executor_.add_node(node)
     peer.wait(lambda: len(ahead) > 40)
     # What is due is never early by more than a timer's rounding.
@@ -337,15 +337,15 @@ def test_a_timer_that_comes_late_makes_no_tick_early(make_node, peer, phase):
     late; then a tick takes a period and a half. Before, the last but one after it came early.
     """
     node, ahead = make_node(scene='flight', rate=100.0), []
-    make_tick, pauses = node._ticker._tick, {8: 0.53, 9: phase / 100, 14: 0.015}
+    make_tick, pauses = node.ticker._tick, {8: 0.53, 9: phase / 100, 14: 0.015}
 
     def tick(due):
         ahead.append(due - time.monotonic_ns())
         make_tick(due)
         time.sleep(pauses.get(len(ahead), 0.0))
 
-    node._ticker._tick = tick
+    node.ticker._tick = tick
     peer.executor_.add_node(node)
     peer.wait(lambda: len(ahead) > 24)
     assert max(ahead) < 1e6
-    assert node._ticker.dropped_ticks > 0
+    assert node.ticker.dropped_ticks > 0

@@ -40,6 +40,7 @@ from .messages.interactive_markers import InteractiveMarkers
 from .outputs import Outputs, PreparedOutputs
 from .parameters.node_settings import SPECS, NodeSettings
 from .parameters.parameters import Parameters, make_simulation
+from .process.node_executor import NodeExecutor
 from .process.rclpy_context import rclpy_context
 from .process.signals import run_uninterrupted, run_until_signal
 from .recovery import Recovery
@@ -127,7 +128,7 @@ class RagdollNode(Node):
         self._set_simulation(self.simulation)
         self._log_start()
         self._outputs.set_clock_publisher(self.settings.publish_clock)
-        self._ticker = Ticker(self, self._steady, self.tick)
+        self.ticker = Ticker(self, self._steady, self.tick)
         self.create_timer(GRAPH_PERIOD, self._on_graph_timer, clock=self._steady)
         if self.settings.start_paused:
             self.pause(True)
@@ -149,15 +150,15 @@ class RagdollNode(Node):
     @property
     def services(self) -> Iterator[Service]:
         """Services that an executor is to poll at this wake-up."""
-        return super().services if self._ticker.polls(SERVICE_INTERVAL) else iter(())
+        return super().services if self.ticker.polls(SERVICE_INTERVAL) else iter(())
 
     @property
     def waitables(self) -> Iterator[Waitable]:
         """QoS events and actions that an executor is to poll at this wake-up."""
-        if self._ticker.polls(QOS_EVENT_INTERVAL):
+        if self.ticker.polls(QOS_EVENT_INTERVAL):
             return super().waitables
         return iter(self.simulation_interfaces.actions
-                    if self._ticker.polls(SERVICE_INTERVAL) else ())
+                    if self.ticker.polls(SERVICE_INTERVAL) else ())
 
     def tick(self, due: float | None = None) -> None:
         """Make one tick and publish; a bad state is not published.
@@ -176,7 +177,7 @@ class RagdollNode(Node):
         if is_good:
             self._imus.publish(self.simulation, self.stamp)
             self._impacts.publish(self.simulation, self.stamp)
-        self._ticker.set_idle(self.simulation.asleep and not (
+        self.ticker.set_idle(self.simulation.asleep and not (
             self._outputs.has_subscribers or self._imus.has_subscribers))
         lag = 0.0 if due is None else start - due
         self._diagnostics.record_tick(time.monotonic_ns() - start, lag, self.simulation.tick)
@@ -188,7 +189,7 @@ class RagdollNode(Node):
 
     def run_beside(self, make: Callable[[], Result]) -> Result:
         """What ``make`` returns, which runs in a thread while the ticks go on."""
-        return self._ticker.run_beside(make)
+        return self.ticker.run_beside(make)
 
     def change_dolls(self, prepare: Callable[[Simulation], PreparedChange]) -> None:
         """Add or remove dolls as ``prepare(simulation)`` says, beside the ticks; time goes on,
@@ -225,7 +226,7 @@ class RagdollNode(Node):
 
     def unload_world(self) -> None:
         """End the world: nothing is simulated or published until another one is loaded."""
-        self._ticker.stop()
+        self.ticker.stop()
         self._impacts.stop()
         self.has_world, self.paused = False, True
         self._event_log.unload()
@@ -265,7 +266,7 @@ class RagdollNode(Node):
     def end(self) -> None:
         """Destroy the node and log a summary, which works after rclpy's shutdown as well."""
         line = end_line(self.simulation, self.input_counts.refused.total(),
-                        self._ticker.dropped_ticks)
+                        self.ticker.dropped_ticks)
         self.destroy_node()
         self.get_logger().info(line)
 
@@ -291,9 +292,9 @@ class RagdollNode(Node):
         """Restart the ticks at the requested real-time factor, or stop them while paused."""
         self._diagnostics.restart()
         if self.paused:
-            self._ticker.stop()
+            self.ticker.stop()
         else:
-            self._ticker.start(self.simulation.tick / self.settings.real_time_factor)
+            self.ticker.start(self.simulation.tick / self.settings.real_time_factor)
 
     def _publish(self) -> None:
         simulation, now = self.simulation, time.monotonic_ns()
@@ -420,7 +421,7 @@ class RagdollNode(Node):
 
     def _diagnostic_values(self) -> dict:
         """Values of the node for /diagnostics; ``stamp_pace``: simulated time per stamp time."""
-        settings, ticker = self.settings, self._ticker
+        settings, ticker = self.settings, self.ticker
         stamp_factor = 1.0 if settings.publish_clock else settings.real_time_factor
         return {'paused': self.paused, 'real_time_factor': settings.real_time_factor,
                 'lost_time': ticker.dropped_time / 1e9, 'dropped_ticks': ticker.dropped_ticks,
@@ -451,7 +452,7 @@ def _spin(arguments: list[str]) -> int:
     with rclpy_context(arguments):
         node = RagdollNode()
         try:
-            rclpy.spin(node)
+            rclpy.spin(node, NodeExecutor(node.ticker))
         finally:
             run_uninterrupted(node.end)
     return 0

@@ -76,7 +76,7 @@ class Ticker:
         self._ticks_per_wake = 1
         self._throttles = {interval: PollThrottle(interval)
                            for interval in (SERVICE_INTERVAL, QOS_EVENT_INTERVAL)}
-        self._timer = node.create_timer(1.0, self._on_timer, clock=steady)
+        self._timer = node.create_timer(1.0, self.run, clock=steady)
 
     @property
     def dropped_time(self) -> float:
@@ -91,6 +91,17 @@ class Ticker:
     def polls(self, interval: int) -> bool:
         """Whether to poll entities of this ``interval``, one of those above; true while stopped."""
         return not self._running or self._throttles[interval].is_open
+
+    @property
+    def polls_any(self) -> bool:
+        """Whether entities of any interval are to be polled, as while stopped."""
+        return any(map(self.polls, self._throttles))
+
+    @property
+    def wait(self) -> float:
+        """Time until ticks are to be made, ns."""
+        later = (self._ticks_per_wake - 1) * self._pacer.period
+        return self._pacer.wait(time.monotonic_ns()) + later
 
     def start(self, period: float) -> None:
         """Start or restart; the first tick is due one ``period``, ns, from now."""
@@ -137,7 +148,7 @@ class Ticker:
             while not done.wait(pause):
                 begin = time.monotonic()
                 if self._running:
-                    self._on_timer()
+                    self.run()
                 # As long as the ticks took: on a busy machine they would leave nothing to it.
                 pause = max(MIN_TIMER_PERIOD / 1e9, time.monotonic() - begin)
         finally:
@@ -151,8 +162,8 @@ class Ticker:
         self._timer.timer_period_ns = max(MIN_TIMER_PERIOD, round(period)) * ticks
         self._max_ticks = math.ceil(CATCH_UP_RATE * self._timer.timer_period_ns / period)
 
-    def _on_timer(self) -> None:
-        """Make the ticks that are due, within the time limit."""
+    def run(self) -> None:
+        """Make the ticks that are due, within the time limit; the timer calls it."""
         woken = time.monotonic_ns()
         for throttle in self._throttles.values():
             throttle.wake(woken)

@@ -468,12 +468,12 @@ class Clusters:
 
     def checkpoint(self) -> dict[str, np.ndarray]:
         """The fields CHECKPOINT of all states; as bytes, as numpy copies records slowly."""
-        return {'departed': self.departed.copy(), **{
+        return {'departed': self.departed.view(np.uint8).copy(), **{
             name: self._states.arrays[name].view(np.uint8).copy() for name in CHECKPOINT}}
 
     def restore_checkpoint(self, checkpoint: dict[str, np.ndarray]) -> None:
         """Restore a checkpoint, each doll a cluster by itself."""
-        self.departed[:] = checkpoint['departed']
+        self.departed.view(np.uint8)[:] = checkpoint['departed']
         for name in CHECKPOINT:
             self._states.arrays[name].view(np.uint8)[:] = checkpoint[name]
         self.separate()
