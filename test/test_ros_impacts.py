@@ -101,7 +101,7 @@ def test_markers_of_impacts_are_arrows_with_their_ratio(make_node, peer):
             assert tuple(tail) == impact.point
             along = tip - tail
             np.testing.assert_allclose(along / np.linalg.norm(along), impact.normal, atol=1e-12)
-            assert f'{impact.peak_force:.0f} N' in text.text
+            assert text.text.startswith(f'{impact.bone}: {impact.peak_force:.0f} N, ')
             assert f'{impact.ratio:.2f} of the limit' in text.text
             assert (arrow.color.r > 0.8) == (impact.ratio > 1)
             ids.append(arrow.id)

@@ -1,4 +1,4 @@
-"""The node's executor: every tick on time, every message before the next one, services in between."""
+"""The node's executor: every tick on time, messages before the next, services in between."""
 from __future__ import annotations
 
 import threading

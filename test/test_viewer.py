@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import time
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 pytest.importorskip('viser')
 from page_client import START, batch_of, served, wait
 
+from ragdoll_ros.files.limits import load_limits
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
@@ -467,6 +469,15 @@ def test_impacts_on_demand(page):
     assert all('of the limit' in arrow.text for arrow in page.frame.impacts)
     labels = wait_for(page, '/scene/impacts_labels/0')
     assert labels.text in {arrow.text for arrow in page.frame.impacts}
+    # The worst one of three seconds, as they are simulated apart from the page.
+    wait(lambda: page.frame.time > 3)
+    with Simulation(page.frame.scene) as simulation:
+        simulation.record_impacts(load_limits())
+        hits = [hit for _ in range(300) if simulation.advance() for hit in simulation.impacts]
+    worst = max(hits, key=lambda hit: hit.ratio)
+    expected = (f'{worst.bone}: {worst.peak_force:.0f} N, {worst.ratio:.2f} of the limit, '
+                f'at {math.ceil(worst.time / 1e7) / 100:.2f} s')
+    assert expected in page.display.worst_impact.line.content
     client.update(page.display.impacts, False)
     wait(lambda: page.server.scene.get_handle_by_name('/scene/impacts_labels/0') is None)
     wait(lambda: not page.source.frame.impacts)
@@ -544,6 +555,10 @@ def test_another_scene_is_framed_while_the_camera_follows(page):
     # In free space nothing falls.
     home = home_position(*bounding_spheres(scene, page.frame.state), centre, camera.fov,
                  camera.image_width / camera.image_height)
+    assert np.linalg.norm(camera.position - home) < 0.01 * np.linalg.norm(home - centre)
+    # It stays there when it follows no more: the views before were of another scene.
+    client.update(page.display.follow, False)
+    wait(lambda: page.server.scene.get_handle_by_name('/followed') is None)
     assert np.linalg.norm(camera.position - home) < 0.01 * np.linalg.norm(home - centre)
 
 

@@ -325,3 +325,15 @@ def test_a_root_is_fixed_by_its_checkbox(view):
     view.press('Undo: numbers of torso')
     view.wait(lambda: row(view, 'torso').text_content() == 'torso')
     assert saved(view) == SCENE
+
+
+def test_enter_in_a_setting_applies_it(view):
+    view.tab('Play')
+    view.page.get_by_text('Settings', exact=True).click()
+    # The first: the form of the tab Edit has one, too.
+    friction = view.row('Friction').locator('input').first
+    friction.fill('0.05')
+    friction.press('Enter')
+    view.page.get_by_text('Friction is unlimited').wait_for(state='hidden')
+    view.tab('Edit')
+    view.wait(lambda: saved(view).material.friction == 0.05)

@@ -89,7 +89,7 @@ def test_the_estimate_is_that_of_the_run_of_reference():
 
 
 def test_a_pace_below_real_time_is_enough_where_a_scene_asks_for_it():
-    assert cost.cost_text(12.0, 0.01, 0.6) == ('0.6 of real time here: a tick of 10 ms takes 12 ms',
-                                               False)
+    assert cost.cost_text(12.0, 0.01, 0.6) == (
+        'Its pace, 0.6 of real time, here: a tick of 10 ms takes 12 ms', False)
     assert cost.cost_text(25.0, 0.01, 1.0) == ('At most 0.4 of real time here: a tick of 10 ms '
                                                'takes 25 ms', True)

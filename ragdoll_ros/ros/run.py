@@ -131,7 +131,7 @@ def _spin_and_log(teleop: Teleop, node: subprocess.Popen, page: subprocess.Popen
             fallback.update()
             if time.monotonic() >= next_line:
                 next_line += LOG_PERIOD
-                print(teleop.status_text(''), flush=True)
+                print(f'{teleop.status_text("")}\n', end='', flush=True)
 
 
 class _ResumeWithoutPage:

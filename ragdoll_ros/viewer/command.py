@@ -181,7 +181,9 @@ def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event
         with server_at(options.host, number) as server:
             page = Page(server, source, folder)
             page.start_when_visible = start_when_visible(options, source)
-            print(f'The page is at http://{url_host(options.host)}:{server.get_port()}', flush=True)
+            # In one piece: without a buffer, another process's line could come before its end.
+            print(f'The page is at http://{url_host(options.host)}:{server.get_port()}\n', end='',
+                  flush=True)
             if is_public(options.host):
                 print(PUBLIC_WARNING.format(server.get_port(), folder), file=sys.stderr, flush=True)
             page.run(stop)

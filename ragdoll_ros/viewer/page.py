@@ -53,6 +53,8 @@ RECORDING_HINT = ('A recorded run. Space pauses, R restarts, drag the bar below 
 DISCONNECTED = ('The viewer that served this page has ended, or cannot be reached: start it again '
                 'at the same port, and the page will reconnect by itself.')
 
+OWN_SCENES = 'Characters and scenes of your own: the tab Edit, below Files'
+
 
 class Page:
     """What viser serves; one thread calls `update` and alone draws. ``folder``: of the files."""
@@ -102,6 +104,7 @@ class Page:
         self.gallery: Gallery | None = None
         if is_simulated:
             with self.tabs.add_tab('Scenes'):
+                server.gui.add_html(colored(OWN_SCENES, GREY))
                 self.gallery = Gallery(server, self.controls.load)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
@@ -170,6 +173,7 @@ class Page:
         self.timeline.add(frame)
         self.controls.add(frame)
         self.controls.pushes.add(frame)
+        self.display.worst_impact.add(frame)
         self.plots.add(frame, self.timeline.live_instant(frame), status, now)
 
     def _show(self, live: Frame, status: SourceStatus, now: float) -> None:
@@ -237,6 +241,7 @@ class Page:
         with self._edit_tab:
             self.editor = Editor(self.server, scene, self.source.set_scene, self.source.pause,
                                  self._edit_banner, self._folder)
+            self.editor.on_other_enter = self.settings.enter
         self.transport.before_step = self.editor.leave
 
     def _end_editing(self) -> None:

@@ -50,7 +50,8 @@ class RecordingPanel:
                                                hint='This view as ragdoll.png')
             export = server.gui.add_button(
                 'Export: glTF, BVH, CSV, MCAP', icon=viser.Icon.DOWNLOAD,
-                hint='The whole timeline as run.zip; glTF for Blender')
+                hint='The whole timeline as run.zip, with times from its beginning; glTF for '
+                'Blender')
         self._frame: Frame | None = None
         export.on_click(self._send_export)
         self.button.on_click(lambda event: self.toggle(event.client))

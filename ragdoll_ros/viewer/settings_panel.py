@@ -87,6 +87,11 @@ class SettingsPanel:
             asyncio.get_running_loop().run_in_executor(
                 None, self._try, lambda name=event.target.value: self.source.set_accuracy(name))
 
+    def enter(self, field: str) -> None:
+        """Apply the settings if Enter was pressed in one of their fields; in viser's thread."""
+        if self.form.has(field):
+            asyncio.get_running_loop().run_in_executor(None, self._apply)
+
     def _apply(self) -> None:
         """Restart with the fields' changed values, or show errors below them."""
         values, found = self.form.values()

@@ -1,4 +1,4 @@
-"""Impacts as markers: an arrow along each impulse, and its force and ratio to the limit as text."""
+"""Impacts as markers: an arrow along each impulse; bone, force and ratio to the limit as text."""
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The executor of the node: between ticks only messages are looked for, all else ten times a second.
+"""The executor of the node: between ticks it takes messages only, all else ten times a second.
 
 rclpy's executor collects all entities of a node and waits for them anew before each callback, and
 once more after it. With a page that shows dolls at rest that took half of the node's CPU time.
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..ticker import Ticker
 
 MAX_MESSAGES = 1000
-"""Of one topic between two ticks: a publisher that is faster than this must not hold up the rest."""
+"""Of one topic between two ticks: a publisher that is faster must not hold up the rest."""
 
 
 class NodeExecutor(SingleThreadedExecutor):

@@ -76,6 +76,7 @@ class Cameras:
             first, look_at = self._server.initial_camera, box_center(*spheres)
             first.look_at = look_at
             first.position = home_position(*spheres, look_at, FIELD_OF_VIEW, ASPECT)
+            self._before_follow.clear()  # views of the scene before
             for client in self._server.get_clients().values():
                 self.go_home(client)
         elif frame.scene is not before.scene or frame.time < before.time:

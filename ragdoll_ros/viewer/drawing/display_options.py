@@ -6,6 +6,7 @@ from collections.abc import Callable
 import viser
 
 from ..sources.source import RequestedData
+from ..worst_impact import WorstImpact
 
 
 def configure_theme(server: viser.ViserServer, dark: bool) -> None:
@@ -29,8 +30,9 @@ class DisplayOptions:
                 '1 m is the weight of the first doll; a node publishes points without forces')
             self.impacts = server.gui.add_checkbox(
                 'Impacts', initial_value=False, hint='For a second after each impact an arrow '
-                'along its impulse, with the peak force and its ratio to the limit of the body '
-                'region; engine rigid')
+                'along its impulse, with the bone, the peak force and its ratio to the limit of the '
+                'body region; engine rigid')
+            self.worst_impact = WorstImpact(server.gui)
             self.limits = server.gui.add_checkbox(
                 'Joint limits', initial_value=False,
                 hint="An arc for a joint's range; its needle is red at the limits")

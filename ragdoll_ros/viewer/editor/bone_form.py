@@ -67,7 +67,8 @@ JOINT = (
           'Lower, upper; ball: swing; child relative to parent; empty: free'),
     Field('limits_2', 'Limits 2, °', 'text', 'Lower, upper; ball: twist; empty: free'),
     Field('limits_3', 'Limits 3, °', 'text', 'Lower, upper; ball with two axes: twist'),
-    Field('damping', 'Damping, N m s', 'number', 'N m s/rad, about each axis'))
+    Field('damping', 'Damping, N m s', 'number',
+          'Resistance to rotation, N m s/rad about each axis: more makes the joint stiffer'))
 
 
 def read_bone(scene: Scene, name: str) -> FormValues:

@@ -52,6 +52,8 @@ class Editor:
         self._waiting = 0
         """Number of forms that were entered and are not applied yet."""
         self._was_paused = False
+        self.on_other_enter: Callable[[str], None] = lambda _: None
+        """Takes the id of a field of no form here in which Enter was pressed, in viser's thread."""
         self.bones: tuple[str, ...] = ()
         """Names of the selected bones, the last one that was selected at the end."""
         self.static: str | None = None
@@ -252,6 +254,8 @@ class Editor:
             self._in_order.submit(self.add_bone, self.panel.name.value)
         elif field == handle_id(self.panel.static_name):
             self._in_order.submit(self.add_static, self.panel.static_name.value)
+        else:
+            self.on_other_enter(field)
 
     def _enter_form(self) -> None:
         """Apply what the form has at this moment: it may be typed further meanwhile."""

@@ -45,5 +45,6 @@ def cost_text(cost: float, step: float, pace: float) -> tuple[str, bool]:
     factor = 1e3 * step / cost
     ticks = f'a tick of {1e3 * step:g} ms takes {two_digits(cost)} ms'
     if factor >= pace:
-        return f'{"Real time" if pace == 1 else f"{pace:g} of real time"} here: {ticks}', False
+        rate = 'Real time here' if pace == 1 else f'Its pace, {pace:g} of real time, here'
+        return f'{rate}: {ticks}', False
     return f'At most {factor:.2g} of real time here: {ticks}', True

@@ -95,8 +95,9 @@ class BallThrower:
         elif self._pending is None:
             self._pending = origin, direction
             asyncio.get_running_loop().run_in_executor(None, self._add, client, frame.scene)
-            client.add_notification('A ball joins the scene', 'The scene starts again with it.',
-                                    auto_close_seconds=6)
+            flies = ' It flies when you play (Space).' if self._source.status.paused else ''
+            client.add_notification('A ball joins the scene',
+                                    f'The scene starts again with it.{flies}', auto_close_seconds=6)
 
     def update(self, frame: Frame, motion: Motion) -> None:
         """Throw what waits; ``motion`` is that of the newest frame."""
