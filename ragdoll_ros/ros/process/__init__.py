@@ -1,1 +1,1 @@
-"""Signals and the rclpy context of a process."""
+"""Signals, the rclpy context and the executor of a process."""

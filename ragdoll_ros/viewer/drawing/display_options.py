@@ -30,8 +30,8 @@ class DisplayOptions:
                 '1 m is the weight of the first doll; a node publishes points without forces')
             self.impacts = server.gui.add_checkbox(
                 'Impacts', initial_value=False, hint='For a second after each impact an arrow '
-                'along its impulse, with the bone, the peak force and its ratio to the limit of the '
-                'body region; engine rigid')
+                'along its impulse, with the bone, the peak force and its ratio to the limit of '
+                'the body region; engine rigid')
             self.worst_impact = WorstImpact(server.gui)
             self.limits = server.gui.add_checkbox(
                 'Joint limits', initial_value=False,
