@@ -169,6 +169,36 @@ def test_a_face_is_stopped_by_the_corner_of_a_tetrahedron():
     assert below > 50
 
 
+@pytest.mark.parametrize('kind', [BOX, HULL])
+def test_a_corner_in_a_valley_is_stopped(kind):
+    """It is below both faces, and seen along the normal of each above the other one: between them
+    is what its depth times the slope is wide.
+    """
+    rng, out = np.random.default_rng(8), np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT)
+    corners = {HULL: VERTICES, BOX: np.array(SIZES[BOX]) * np.array(
+        [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])}[kind]
+    for _ in range(300):
+        slope, depth = rng.uniform(0.05, 0.6), 10 ** rng.uniform(-6, -3.5)
+        pair = geoms([[0, -2, 0], [0, 2, 0], [2, 0, 2 * slope], [-2, 0, 2 * slope]],
+                     [[0, 2, 1], [0, 1, 3]])
+        while True:
+            turn = rotation.normalized(rng.normal(size=4))
+            turned = rotation.rotate(turn, corners)
+            lowest = turned[turned[:, 2].argmin()]
+            arms = np.delete(turned, turned[:, 2].argmin(), axis=0) - lowest
+            # The others are above both faces.
+            if (arms[:, 2] > slope * np.abs(arms[:, 0]) + 0.01).all():
+                break
+        place = np.array((rng.uniform(-1, 1) * depth * slope, rng.uniform(-0.5, 0.5), -depth))
+        shape = placed(kind, place - lowest, turn)
+        found = []
+        for triangle in pair:
+            _, count = measure(shape, triangle, 0.0, out)
+            found += out[:count]['gap'].tolist()
+        # By the nearer plane it is at least as deep as straight down over their common slope.
+        assert found and min(found) <= -depth / np.sqrt(1 + slope ** 2) + 1e-12
+
+
 def pair_normal(triangle):
     return triangle.rotation[:, 2]
 

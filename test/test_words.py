@@ -18,7 +18,7 @@ MATRICES = {
     'r', 'm', 'A', 'B', 'out', 'matrix', 'inertia', 'own', 'axes', 'block',
     'self._model.geom_solref', 'self._model.jnt_solref',  # entries of small matrices and vectors
     'k', 'dense', 'rates', 'end_rates', 'cluster.end_rates',  # stages of a Runge-Kutta method
-    'OCTAGON', 'DIRECTIONS', 'centers',  # pairs, triples
+    'OCTAGON', 'centers',  # pairs, triples
     'found', 'geom_pairs', 'bones', 'pairs', 'table',
     "contacts['impulse']", "found['impulse']",  # along the rows of a contact, the normal first
     'self.rows'}  # of DollTotals, which names them

@@ -31,7 +31,7 @@ has a gap of its own; see ground_point() of contact/gaps.py."""
 HULL_TABLE = np.dtype([
     ('first_vertex', np.int64), ('vertex_count', np.int64), ('first_face', np.int64),
     ('face_count', np.int64), ('triangle_count', np.int64), ('first_edge', np.int64),
-    ('edge_count', np.int64), ('first_neighbor', np.int64), ('extremes', np.int64, 6),
+    ('edge_count', np.int64), ('first_index', np.int64), ('extremes', np.int64, 6),
     ('size', float)], align=True)
 """A convex hull: where its vertices are in System.hull_vertices; where its triangles are in
 System.hull_faces, first one of each face, then those that lie in the planes of these; where its
@@ -40,14 +40,15 @@ its radius about its centroid, m."""
 
 HULL_VERTEX = np.dtype([('point', float, 3), ('first_neighbor', np.int64),
                         ('neighbor_count', np.int64)], align=True)
-"""A vertex of a hull, m, in its geom's frame, whose origin is its centroid; and which are the other
-ends of its edges: where they are in System.hull_neighbors, counted from the hull's first. These are
-counted from the hull's first vertex."""
+"""A vertex of a hull, m, in its geom's frame, whose origin is its centroid; and where the other
+ends of its edges are in System.hull_indices, counted from the hull's ``first_index``. These are
+indices of vertices, counted from the hull's first, as are corners."""
 
-HULL_FACE = np.dtype([('normal', float, 3), ('offset', float), ('corners', np.int64, 3)],
-                     align=True)
+HULL_FACE = np.dtype([('normal', float, 3), ('offset', float), ('corners', np.int64, 3),
+                      ('first_corner', np.int64), ('corner_count', np.int64)], align=True)
 """A triangle of a hull: unit normal n, outwards, and offset d, m, of its plane n x = d, equal for
-all triangles of a flat face; its corners, anticlockwise, counted from the hull's first vertex."""
+all triangles of a flat face; its corners, anticlockwise. Of the first of a face: where the corners
+of the face are in System.hull_indices, anticlockwise."""
 
 HULL_EDGE = np.dtype([('corners', np.int64, 2), ('inward', float, (2, 3))], align=True)
 """An edge between two faces of a hull: its corners as those of HULL_FACE, and the unit vectors
@@ -69,7 +70,7 @@ System = collections.namedtuple(
     'System', 'tree gravity dof_parent dof_body dof_damping body_last_dof body_root body_doll '
     'geoms pairs joint_limits ground_normal ground_offset restitution_speed doll_masses '
     'energy_scale flight_enabled hull_vertices hull_faces hull_edges '
-    'hull_neighbors hulls')
+    'hull_indices hulls')
 """A scene of n bodies, nv degrees of freedom and d dolls. ``tree`` (n,): the kinematic trees, see
 dynamics/body.py. ``gravity`` (3,) m/s^2. ``dof_parent`` (nv,): the next degree of freedom towards
 the root, -1 at its end; ``dof_body`` (nv,); ``dof_damping`` (nv,) N m s/rad. ``body_last_dof``
@@ -79,7 +80,7 @@ root; ``body_doll`` (n,). ``geoms``, static ones last; ``pairs`` (of geoms that 
 ``restitution_speed`` (1,) m/s: slower impacts do not bounce. ``doll_masses`` (d,) kg.
 ``energy_scale`` (1,) J: m g L of the whole system, L the largest reach. ``flight_enabled`` (1,):
 whether joint damping allows explicit integration. ``hull_vertices``, ``hull_faces``,
-``hull_edges``, ``hull_neighbors`` (m,) and ``hulls``: the convex hulls."""
+``hull_edges``, ``hull_indices`` (m,) and ``hulls``: the convex hulls."""
 
 OVERLAPPING, JOINT_OUTSIDE_LIMITS, KINEMATIC = 1, 2, 4
 """Flags, why a pair is excluded from collision for now: its geoms overlap, as they did at the
@@ -131,7 +132,7 @@ def blank_system() -> System:
         restitution_speed=np.zeros(1), doll_masses=np.zeros(1), energy_scale=np.zeros(1),
         flight_enabled=np.zeros(1), hull_vertices=np.zeros(0, HULL_VERTEX),
         hull_faces=np.zeros(0, HULL_FACE), hull_edges=np.zeros(0, HULL_EDGE),
-        hull_neighbors=np.zeros(0, np.int64), hulls=np.zeros(0, HULL_TABLE))
+        hull_indices=np.zeros(0, np.int64), hulls=np.zeros(0, HULL_TABLE))
 
 
 SYSTEM = bundle_type(blank_system())

@@ -17,13 +17,13 @@ ONE_PLANE = 1e-9
 
 class HullTables(NamedTuple):
     """Fields of a System of the same names: HULL_VERTEX (k,), HULL_FACE (t,), HULL_EDGE (e,),
-    neighbors (m,) and HULL_TABLE (h,).
+    indices (m,) and HULL_TABLE (h,).
     """
 
     hull_vertices: np.ndarray
     hull_faces: np.ndarray
     hull_edges: np.ndarray
-    hull_neighbors: np.ndarray
+    hull_indices: np.ndarray
     hulls: np.ndarray
 
 
@@ -43,11 +43,11 @@ def hull_tables(hull: Hull) -> HullTables:
     # The support function, so that no vertex is outside.
     faces['offset'] = [(vertices @ normal).max() for normal in triangles.normals]
     radius = np.linalg.norm(vertices, axis=1).max()
-    faces, count = _by_faces(faces, radius)
+    faces, groups = _by_faces(faces, radius)
     vertices = vertices[order]
     edges = _edges(vertices, faces)
     table = np.zeros(1, HULL_TABLE)
-    table['vertex_count'], table['face_count'] = len(vertices), count
+    table['vertex_count'], table['face_count'] = len(vertices), len(groups)
     table['triangle_count'], table['edge_count'], table['size'] = len(faces), len(edges), radius
     table['extremes'] = np.stack([vertices.argmax(axis=0), vertices.argmin(axis=0)], axis=1).ravel()
     ends = np.concatenate([faces['corners'], np.roll(faces['corners'], -1, axis=1)], axis=1)
@@ -55,7 +55,10 @@ def hull_tables(hull: Hull) -> HullTables:
     records = np.zeros(len(vertices), HULL_VERTEX)
     records['point'], records['neighbor_count'] = vertices, np.bincount(begin)
     records['first_neighbor'] = np.cumsum(records['neighbor_count']) - records['neighbor_count']
-    return HullTables(records, faces, edges, np.ascontiguousarray(end), table)
+    polygons = [_boundary(faces['corners'][group]) for group in groups]
+    faces['corner_count'][:len(groups)] = sizes = [len(polygon) for polygon in polygons]
+    faces['first_corner'][:len(groups)] = len(end) + np.cumsum(sizes) - sizes
+    return HullTables(records, faces, edges, np.concatenate([end, *polygons]), table)
 
 
 def hull_geom(hull: Hull, pose: Pose) -> np.ndarray:
@@ -71,35 +74,47 @@ def hull_geom(hull: Hull, pose: Pose) -> np.ndarray:
 
 def join_hulls(parts: Sequence[HullTables]) -> HullTables:
     """Concatenate tables: the hulls of each follow those of the one before."""
-    vertices = faces = edges = neighbors = 0
+    vertices = faces = edges = indices = 0
     moved = []
     for part in parts:
         table = part.hulls.copy()
         table['first_vertex'] += vertices
         table['first_face'] += faces
         table['first_edge'] += edges
-        table['first_neighbor'] += neighbors
+        table['first_index'] += indices
         moved.append(table)
         vertices, faces = vertices + len(part.hull_vertices), faces + len(part.hull_faces)
-        edges, neighbors = edges + len(part.hull_edges), neighbors + len(part.hull_neighbors)
+        edges, indices = edges + len(part.hull_edges), indices + len(part.hull_indices)
     return HullTables(*(np.concatenate(each) for each in zip(*(
         part[:-1] for part in parts), strict=True)), np.concatenate(moved))
 
 
-def _by_faces(faces: np.ndarray, size: float) -> tuple[np.ndarray, int]:
+def _by_faces(faces: np.ndarray, size: float) -> tuple[np.ndarray, list[np.ndarray]]:
     """Triangles (t,), HULL_FACE, in another order: first one of each flat face, then the others,
-    which get its plane; and the number of faces.
+    which get its plane; and the triangles of each face, indices.
     """
     planes = np.column_stack([faces['normal'], faces['offset'] / size])
-    left, firsts, others = np.arange(len(planes)), [], []
+    left, groups = np.arange(len(planes)), []
     while len(left):
         same = np.abs(planes[left] - planes[left[0]]).max(axis=1) < ONE_PLANE
-        firsts.append(left[0])
-        others.append(left[same][1:])
+        groups.append(left[same])
         for name in ('normal', 'offset'):
             faces[name][left[same]] = faces[name][left[0]]
         left = left[~same]
-    return faces[np.concatenate([np.array(firsts), *others])], len(firsts)
+    order = np.concatenate([[group[0] for group in groups], *(group[1:] for group in groups)])
+    place = np.argsort(order)
+    return faces[order], [place[group] for group in groups]
+
+
+def _boundary(corners: np.ndarray) -> np.ndarray:
+    """Corners (c,) of the polygon that triangles (t, 3) make, anticlockwise."""
+    edges = {(int(a), int(b)) for triangle in corners
+             for a, b in zip(triangle, np.roll(triangle, -1), strict=True)}
+    after = {a: b for a, b in edges if (b, a) not in edges}
+    found = [min(after)]
+    while (onward := after[found[-1]]) != found[0]:
+        found.append(onward)
+    return np.array(found)
 
 
 def _edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

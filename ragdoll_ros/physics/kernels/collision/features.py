@@ -8,7 +8,8 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..maths.vectors import (Vec3, add_scaled, column, dot, put, scale, to_local, to_world,
                              vec)
-from .hulls.polyhedron import face_polygon, hull_plane, nearest_face, supporting_hull_edge
+from .hulls.polyhedron import (face_polygon, hull_plane, supporting_hull_edge,
+                               supporting_hull_face)
 from .shapes import BOX, HULL, Shape
 
 FEATURE_SINE = 0.1
@@ -34,8 +35,8 @@ def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tupl
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == HULL:
-        face = nearest_face(shape.system, shape.hull, (x, y, z))
-        count = face_polygon(shape.system, shape.hull, face, corners)
+        face = supporting_hull_face(shape.system, shape.hull, (x, y, z))
+        count = face_polygon(shape.system, shape.hull, face, (x, y, z), corners)
         for k in range(count):
             put(corners[k].point, to_world(shape.rotation, vec(corners[k].point)))
         return count, face
@@ -99,7 +100,7 @@ def face_cosine(shape: Shape, n: Vec3) -> float:
     """
     x, y, z = to_local(shape.rotation, n)
     if shape.kind == HULL:
-        face = nearest_face(shape.system, shape.hull, (x, y, z))
+        face = supporting_hull_face(shape.system, shape.hull, (x, y, z))
         return dot(hull_plane(shape.system, face)[0], (x, y, z))
     return max(abs(x), abs(y), abs(z)) if shape.kind == BOX else abs(z)
 

@@ -13,10 +13,8 @@ from ...compiling.decorators import compiled
 from ...maths.vectors import (Vec3, add, add_scaled, cross, divide, dot, norm, put, scale, sub, vec)
 from ...system import System, system_at
 
-DIRECTIONS = np.array([(math.cos(angle), math.sin(angle))
-                       for angle in (0.3 + k * math.pi / 4 for k in range(8))])
-"""Those corners of a face are taken that are farthest along these, in its plane. They are turned
-against its first edge, so that the corners of a rectangle do not tie."""
+MAX_POLYGON = 8
+"""Corners that are taken of a face."""
 
 ON_PLANE = 1e-6
 """Of the hull's size: how far a corner of a face may be from its plane, as model.mesh.CONVEX."""
@@ -50,9 +48,9 @@ def supporting_vertex(s: System, hull: int, d: Vec3) -> int:
     most, before = dot(vec(s.hull_vertices[best].point), d), np.int64(-1)
     while best != before:
         before, vertex = best, s.hull_vertices[best]
-        begin = table.first_neighbor + vertex.first_neighbor
+        begin = table.first_index + vertex.first_neighbor
         for k in range(begin, begin + vertex.neighbor_count):
-            other = first + s.hull_neighbors[k]
+            other = first + s.hull_indices[k]
             found = dot(vec(s.hull_vertices[other].point), d)
             if found > most:
                 most, best = found, other
@@ -139,13 +137,18 @@ def hull_faces(system: int, hull: int) -> tuple[int, int]:
 
 
 @compiled
-def nearest_face(system: int, hull: int, d: Vec3) -> int:
-    """Index in System.hull_faces of the face whose normal is nearest to d."""
+def supporting_hull_face(system: int, hull: int, d: Vec3) -> int:
+    """Index in System.hull_faces of the face whose normal is nearest to d, of those that have the
+    vertex farthest along d: that is not on the one nearest of all where it is sharp.
+    """
     s = system_at(system)
-    first, best, most = s.hulls[hull].first_face, s.hulls[hull].first_face, -math.inf
+    first, most = s.hulls[hull].first_face, -math.inf
+    best, top = first, hull_support(system, hull, d)
     for i in range(first, first + s.hulls[hull].face_count):
-        found = dot(vec(s.hull_faces[i].normal), d)
-        if found > most:
+        normal = vec(s.hull_faces[i].normal)
+        found = dot(normal, d)
+        if found > most and (
+                dot(normal, top) >= s.hull_faces[i].offset - ON_PLANE * s.hulls[hull].size):
             most, best = found, i
     return best
 
@@ -165,36 +168,23 @@ def height_above(system: int, face: int, p: Vec3) -> float:
 
 
 @compiled
-def face_polygon(system: int, hull: int, face: int, corners: np.ndarray) -> int:
-    """Write at most 8 corners of a face, those farthest along eight directions, anticlockwise from
-    outside, to ``corners`` of CLIP_VERTEX; their feature ids are indices of vertices in the hull.
-    Returns their number.
+def face_polygon(system: int, hull: int, face: int, d: Vec3, corners: np.ndarray) -> int:
+    """Write the corners of a face, anticlockwise from outside, to ``corners`` of CLIP_VERTEX, at
+    most MAX_POLYGON, of which one is that farthest along d; their feature ids are indices of
+    vertices in the hull. Returns their number.
     """
     s = system_at(system)
-    first, count = s.hulls[hull].first_vertex, 0
-    triangle, normal = s.hull_faces[face], vec(s.hull_faces[face].normal)
-    x = sub(vec(s.hull_vertices[first + triangle.corners[1]].point),
-            vec(s.hull_vertices[first + triangle.corners[0]].point))
-    x = divide(x, norm(x))
-    y, bottom = cross(normal, x), triangle.offset - ON_PLANE * s.hulls[hull].size
-    for k in range(len(DIRECTIONS)):
-        corners[k].gap = -math.inf
-    for i in range(s.hulls[hull].vertex_count):
-        vertex = vec(s.hull_vertices[first + i].point)
-        if dot(vertex, normal) < bottom:
-            continue
-        u, v = dot(vertex, x), dot(vertex, y)
-        for k in range(len(DIRECTIONS)):
-            found = DIRECTIONS[k, 0] * u + DIRECTIONS[k, 1] * v
-            if found > corners[k].gap:
-                corners[k].gap, corners[k].feature_id = found, i
-    for k in range(len(DIRECTIONS)):
-        best = corners[k].feature_id
-        if count and (best == corners[count - 1].feature_id or best == corners[0].feature_id):
-            continue
-        put(corners[count].point, vec(s.hull_vertices[first + best].point))
-        corners[count].feature_id = best
-        count += 1
+    table, polygon = s.hulls[hull], s.hull_faces[face]
+    begin, number = table.first_index + polygon.first_corner, polygon.corner_count
+    top = supporting_vertex(s, hull, d) - table.first_vertex
+    start, count = 0, min(number, MAX_POLYGON)
+    for k in range(number):
+        if s.hull_indices[begin + k] == top:
+            start = k
+    for k in range(count):
+        vertex = s.hull_indices[begin + (start + k * number // count) % number]
+        put(corners[k].point, vec(s.hull_vertices[table.first_vertex + vertex].point))
+        corners[k].feature_id = vertex
     return count
 
 

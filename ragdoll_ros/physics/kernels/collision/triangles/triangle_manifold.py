@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiling.decorators import compiled
-from ...maths.vectors import (Vec3, add, add_scaled, column, dot, neg, put, scale, sub, vec)
+from ...maths.vectors import (Vec3, add, add_scaled, column, cross, dot, neg, norm, put, scale, sub,
+                              vec)
 from ..clipping import MAX_CLIPPED, clip_polygon
 from ..convex_manifold import FACE_COSINE, MERGE_RATIO, clip_edges, closest_on_edges
 from ..features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, face_normal,
@@ -20,10 +21,14 @@ from ..separating_axis import FACE_BIAS, FACE_BIAS_RATIO
 from ..shapes import BOX, CAPSULE, HULL, SPHERE, Shape, bounding_radius
 from .limited_axis import (FACE, FIRST_CORNER, LimitedAxis, core_radius, hull_bounds, is_beside,
                            limited_axis)
-from .triangle import FLAT, Corners, corners_of, supporting_corner
+from .triangle import FLAT, Corners, corners_of, edge_vectors, supporting_corner
 
 WIDER = 1 + 1e-9
 """Scale of the triangle that clips, so that a point on the edge between two is on both."""
+
+OVERLAP = 1e-3
+"""m: by which triangles overlap where the surface bends up; the next face is higher there, so that
+nothing touches this one beyond the edge that does not touch that one as well."""
 
 IS_DISTANCE = 1e-7
 """m: an allowed separation that differs by less from the distance is between the nearest points."""
@@ -40,7 +45,7 @@ def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -
     """Write the manifold of a shape and a triangle; arguments and return value as collide()."""
     if a.kind == HULL:
         height, beside = hull_bounds(a, t)
-        if max(height, beside) > margin:
+        if max(height, beside - OVERLAP) > margin:
             return 0
     found, radius = limited_axis(a, t), core_radius(a)
     if found.allowed - radius > margin or is_beside(found, radius):
@@ -115,6 +120,26 @@ def put_corners(corners: Corners, factor: float, out: np.ndarray) -> None:
 
 
 @compiled
+def widen(corners: Corners, edges: Vec3, out: np.ndarray) -> None:
+    """Move sides of a triangle that put_corners() wrote outwards by OVERLAP, where the surface
+    bends up: a corner of a in the valley is below both faces, and next to both of them.
+    """
+    directions = edge_vectors(corners)
+    for k in range(3):
+        before = (k + 2) % 3
+        wide, wide_before = edges[k] < -FLAT, edges[before] < -FLAT
+        if not wide and not wide_before:
+            continue
+        onward, into = directions[k], directions[before]
+        # Both sides at the corner are as far apart as the sine between them says.
+        sine = norm(cross(into, onward))
+        offset = add(scale(OVERLAP / sine if wide else 0.0, into),
+                  scale(-OVERLAP / sine if wide_before else 0.0, onward))
+        put(out[k].point, add(vec(out[k].point), offset))
+    put(out[3].point, vec(out[2].point))
+
+
+@compiled
 def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
                      scratch: np.ndarray) -> tuple[int, int]:
     """Clip what of a's core supports against the triangle's normal by the triangle. Writes the
@@ -137,6 +162,7 @@ def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
         names[i].feature_id = polygon[i].feature_id
         polygon[i].feature_id = corner_id(a, face, i)
     put_corners(corners, WIDER, sides)
+    widen(corners, found.edges, sides)
     number = clip_polygon(sides, 4, n, polygon, number, points)
     count = 0
     for i in range(number):
