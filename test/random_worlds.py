@@ -237,7 +237,7 @@ def distance(body: StaticBody, points: np.ndarray) -> np.ndarray:
 
 
 def _above(field: HeightField, points: np.ndarray) -> np.ndarray:
-    """Heights (p,) m of points over the triangles of a height field."""
+    """Heights (p,) m of points over the triangles of a height field; beside it infinite."""
     rows, columns = field.heights.shape
     x = (points[:, 0] / field.size[0] + 0.5) * (columns - 1)
     y = (points[:, 1] / field.size[1] + 0.5) * (rows - 1)
@@ -246,7 +246,8 @@ def _above(field: HeightField, points: np.ndarray) -> np.ndarray:
     u, v, h = x - i, y - j, field.heights
     a, b, c, d = h[j, i], h[j, i + 1], h[j + 1, i + 1], h[j + 1, i]
     low = np.where(u >= v, a + u * (b - a) + v * (c - b), a + v * (d - a) + u * (c - d))
-    return points[:, 2] - low
+    beside = (np.abs(points[:, :2]) > np.array(field.size) / 2).any(axis=1)
+    return np.where(beside, np.inf, points[:, 2] - low)
 
 
 def main() -> int:

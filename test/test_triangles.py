@@ -199,6 +199,32 @@ def test_a_corner_in_a_valley_is_stopped(kind):
         assert found and min(found) <= -depth / np.sqrt(1 + slope ** 2) + 1e-12
 
 
+def test_an_edge_in_a_notch_is_stopped():
+    """Two walls meet in a valley; a box's edge leans into its end, on both borders at once: past
+    the end of each by its depth times a slope.
+    """
+    rng, out = np.random.default_rng(11), np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT)
+    for _ in range(300):
+        slope, lean, depth = rng.uniform(1.2, 3), rng.uniform(0.1, 0.6), 10 ** rng.uniform(-6, -3.5)
+        walls = geoms([[0, 0, 0], [0, 0, -1], [1, slope, 0], [1, slope, -1], [1, -slope, 0],
+                       [1, -slope, -1]], [[0, 1, 2], [1, 3, 2], [0, 4, 1], [1, 4, 5]])
+        into = np.array((-np.cos(lean), 0.0, -np.sin(lean)))
+        turn = rotation.multiply(rotation.from_axis_angle((0.0, 1.0, 0.0), -lean),
+                                 rotation.from_axis_angle((0.0, 0.0, 1.0), np.pi / 4))
+        half = np.array((0.2, 0.2, 0.4))
+        aside = rng.uniform(-0.3, 0.3) * depth
+        center = into * (depth - half[0] * np.sqrt(2)) + (0, aside, 0)
+        box = Shape(BOX, tuple(half), tuple(map(float, center)), rotation.matrix(turn))
+        gaps, found = [], []
+        for wall in walls:
+            gap, count = measure(box, wall, 0.0, out)
+            gaps.append(gap)
+            found += [(at['gap'], at['normal'] @ into) for at in out[:count]]
+        assert found and all(against < 0 for _, against in found)
+        # Along a normal between those of the box's faces, at 45 degrees.
+        assert min(gap for gap, _ in found) < -0.3 * depth and min(gaps) < -0.3 * depth
+
+
 def pair_normal(triangle):
     return triangle.rotation[:, 2]
 

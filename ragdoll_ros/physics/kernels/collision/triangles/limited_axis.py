@@ -33,6 +33,9 @@ REACH, BARELY = 0.05, 1e-6
 it may come onto it within a step, and has contact points from when it does. BARELY is the largest
 gap there, and the largest depth."""
 
+IS_DISTANCE = 1e-7
+"""m: an allowed separation that differs by less from the distance is between the nearest points."""
+
 SHALLOW = 1e-3
 """m: what is deeper below a triangle's plane, and half as deep in it from beside, is beside it."""
 
@@ -180,6 +183,15 @@ def is_beside(found: LimitedAxis, radius: float) -> bool:
 
 
 @compiled
+def is_explained(found: LimitedAxis) -> bool:
+    """Whether what the edges allow separates a shape from a triangle nearly as well as any axis: by
+    as much to rounding, or if they overlap by half of it. In a notch of two edges that meet, what
+    lies on both is past the end of each, by its depth times a slope.
+    """
+    return found.allowed > min(found.distance, 2 * found.distance) - IS_DISTANCE
+
+
+@compiled
 def triangle_separation(a: Shape, t: Shape, cutoff: float) -> float:
     """Gap, m, of a shape and a triangle by the normals that its edges allow. Of what is beside it,
     but near, this says how far it is from the triangle's plane, or from that of the next one. Of a
@@ -193,7 +205,7 @@ def triangle_separation(a: Shape, t: Shape, cutoff: float) -> float:
     distance, gap = found.distance - radius, found.allowed - radius
     if is_beside(found, radius):
         return max(distance, -BARELY)
-    if distance > gap:
+    if distance > gap and not is_explained(found):
         share = min(max(distance / REACH, 0.0), 1.0)
         return max(gap, distance - REACH, BARELY * share * share + min(max(distance, -BARELY), 0.0))
     return gap

@@ -20,7 +20,7 @@ from ..manifold import CLIP_VERTEX, merge_points, reduce_points, sort_points
 from ..separating_axis import FACE_BIAS, FACE_BIAS_RATIO
 from ..shapes import BOX, CAPSULE, HULL, SPHERE, Shape, bounding_radius
 from .limited_axis import (FACE, FIRST_CORNER, LimitedAxis, core_radius, hull_bounds, is_beside,
-                           limited_axis)
+                           is_explained, limited_axis)
 from .triangle import FLAT, Corners, corners_of, edge_vectors, supporting_corner
 
 WIDER = 1 + 1e-9
@@ -29,9 +29,6 @@ WIDER = 1 + 1e-9
 OVERLAP = 1e-3
 """m: by which triangles overlap where the surface bends up; the next face is higher there, so that
 nothing touches this one beyond the edge that does not touch that one as well."""
-
-IS_DISTANCE = 1e-7
-"""m: an allowed separation that differs by less from the distance is between the nearest points."""
 
 ON_FACE = 1 << 16
 """Feature ids of points on the triangle's face that are vertices of a: below this."""
@@ -64,7 +61,7 @@ def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -
         middle, u = a_edge(a, arm, n)
         other, v = triangle_edge(corners, feature)
         count = clipped = clip_edges(middle, u, other, v, n, points)
-    if clipped == 0 and s > found.distance - IS_DISTANCE:
+    if clipped == 0 and is_explained(found):
         middle, u = a_edge(a, arm, n)
         if feature == FACE:
             middle = add_scaled(middle, -s / 2, n)
