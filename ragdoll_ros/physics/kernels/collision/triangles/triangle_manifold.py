@@ -131,7 +131,7 @@ def widen(corners: Corners, edges: Vec3, out: np.ndarray) -> None:
         # Both sides at the corner are as far apart as the sine between them says.
         sine = norm(cross(into, onward))
         offset = add(scale(OVERLAP / sine if wide else 0.0, into),
-                  scale(-OVERLAP / sine if wide_before else 0.0, onward))
+                     scale(-OVERLAP / sine if wide_before else 0.0, onward))
         put(out[k].point, add(vec(out[k].point), offset))
     put(out[3].point, vec(out[2].point))
 
