@@ -211,34 +211,35 @@ def _geoms(scene: Scene, tree: np.ndarray) -> tuple[np.ndarray, HullTables]:
     for index, bone in enumerate(scene.bones):
         law = contact_law(np.array(scene.material.on(bone)), base)
         for part in bone.shape.parts:
-            geom, count = _part_geom(bone, part)
+            geom = _part_geom(bone, part)
             geom['body'] = record[index]
             geom['friction'], geom['rolling_friction'], geom['restitution'] = law
-            # What does not yield has nothing to do with the ground.
-            count = 0 if tree['kinematic'][record[index]] else count
-            geom['first_point'], geom['point_count'] = first, count
             if isinstance(part.shape, Hull):
                 geom['hull'] = len(hulls) - 1
                 hulls.append(hull_tables(part.shape))
+                count = len(hulls[-1].hull_vertices)
+            else:
+                count = GROUND_POINTS[part.kind]
+            # What does not yield has nothing to do with the ground.
+            count = 0 if tree['kinematic'][record[index]] else count
+            geom['first_point'], geom['point_count'] = first, count
             made.append(geom)
             first += count
     return np.concatenate(made), join_hulls(hulls)
 
 
-def _part_geom(bone: Bone, part: Part) -> tuple[np.ndarray, int]:
-    """GEOM (1,) of a part of a bone, but for body, law and indices; and how many points of it may
-    touch the ground.
-    """
+def _part_geom(bone: Bone, part: Part) -> np.ndarray:
+    """GEOM (1,) of a part of a bone, but for body, law and indices."""
     shape, pose = part.shape, Pose(rotation.rotate(bone.orientation, np.array(part.position)),
                                    rotation.multiply(bone.orientation, np.array(part.orientation)))
     if isinstance(shape, Hull):
-        return hull_geom(shape, pose), int(hull_tables(shape).hulls['vertex_count'][0])
+        return hull_geom(shape, pose)
     geom = np.zeros(1, GEOM)
     geom['kind'], geom['size'] = SHAPE_KIND[shape.kind], geom_size(shape)
     geom['position'], geom['orientation'] = pose
     geom['bounding_radius'] = bounding_radius(shape)
     geom['reach'] = geom['bounding_radius'] + math.hypot(*part.position)
-    return geom, GROUND_POINTS[shape.kind]
+    return geom
 
 
 def geom_size(shape: object) -> tuple[float, ...]:

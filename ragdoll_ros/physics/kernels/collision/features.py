@@ -36,7 +36,7 @@ def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tupl
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == HULL:
         face = supporting_hull_face(shape.system, shape.hull, (x, y, z))
-        count = face_polygon(shape.system, shape.hull, face, (x, y, z), corners)
+        count = face_polygon(shape.system, shape.hull, face, (x, y, z), MAX_CORNERS, corners)
         for k in range(count):
             put(corners[k].point, to_world(shape.rotation, vec(corners[k].point)))
         return count, face
@@ -121,7 +121,8 @@ def supporting_edge(shape: Shape, n: Vec3) -> tuple[Vec3, Vec3]:
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == HULL:
-        middle, half = supporting_hull_edge(shape.system, shape.hull, (x, y, z))
+        middle, half = supporting_hull_edge(
+            shape.system, shape.hull, (x, y, z), FEATURE_SINE)
         return to_world(shape.rotation, middle), to_world(shape.rotation, half)
     a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if shape.kind == BOX:

@@ -22,7 +22,7 @@ from ..compiling.decorators import compiled
 from ..maths.vectors import (Vec3, add_scaled, column, cross, divide, dot, neg, norm, to_local,
                              to_world)
 from .gjk import SIMPLEX_VERTEX, Direction, closest_direction
-from .hulls.polyhedron import (edge_vector, height_above, hull_edges, hull_faces, hull_plane,
+from .hulls.polyhedron import (edge_vector, hull_edges, hull_faces, hull_plane,
                                is_supporting_edge)
 from .shapes import BOX, CAPSULE, CYLINDER, HULL, Shape, bounding_radius, core_extent, half_width
 
@@ -110,8 +110,10 @@ def _hull_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -> Axis:
         first, end = _faces(own)
         for k in range(first, end):
             # The other's centre is within it, so that it is no farther apart than its centre.
-            if own.kind == HULL and height_above(own.system, k, local) <= max(s, bar):
-                continue
+            if own.kind == HULL:
+                normal, offset = hull_plane(own.system, k)
+                if dot(normal, local) - offset <= max(s, bar):
+                    continue
             n, reach = _face(own, k, towards)
             found = dot(towards, n) - reach - core_extent(other, neg(n))
             if found > s and found > bar:

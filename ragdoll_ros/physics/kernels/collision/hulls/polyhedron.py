@@ -13,14 +13,8 @@ from ...compiling.decorators import compiled
 from ...maths.vectors import (Vec3, add, add_scaled, cross, divide, dot, norm, put, scale, sub, vec)
 from ...system import System, system_at
 
-MAX_POLYGON = 8
-"""Corners that are taken of a face."""
-
 ON_PLANE = 1e-6
 """Of the hull's size: how far a corner of a face may be from its plane, as model.mesh.CONVEX."""
-
-FEATURE_SINE = 0.1
-"""Sine of the angle up to which an edge is perpendicular to n."""
 
 ROUNDING = 1e-9
 """Sine of the angle that a face may rise by beside an edge that supports."""
@@ -161,23 +155,17 @@ def hull_plane(system: int, face: int) -> tuple[Vec3, float]:
 
 
 @compiled
-def height_above(system: int, face: int, p: Vec3) -> float:
-    """How far, m, a point is above the plane of a face."""
-    s = system_at(system)
-    return dot(vec(s.hull_faces[face].normal), p) - s.hull_faces[face].offset
-
-
-@compiled
-def face_polygon(system: int, hull: int, face: int, d: Vec3, corners: np.ndarray) -> int:
-    """Write the corners of a face, anticlockwise from outside, to ``corners`` of CLIP_VERTEX, at
-    most MAX_POLYGON, of which one is that farthest along d; their feature ids are indices of
-    vertices in the hull. Returns their number.
+def face_polygon(system: int, hull: int, face: int, d: Vec3, most: int,
+                 corners: np.ndarray) -> int:
+    """Write at most ``most`` corners of a face, among them that farthest along d, anticlockwise
+    from outside, to ``corners`` of CLIP_VERTEX; their feature ids are indices of vertices in the
+    hull. Returns their number.
     """
     s = system_at(system)
     table, polygon = s.hulls[hull], s.hull_faces[face]
     begin, number = table.first_index + polygon.first_corner, polygon.corner_count
     top = supporting_vertex(s, hull, d) - table.first_vertex
-    start, count = 0, min(number, MAX_POLYGON)
+    start, count = 0, min(number, most)
     for k in range(number):
         if s.hull_indices[begin + k] == top:
             start = k
@@ -189,20 +177,20 @@ def face_polygon(system: int, hull: int, face: int, d: Vec3, corners: np.ndarray
 
 
 @compiled
-def supporting_hull_edge(system: int, hull: int, d: Vec3) -> tuple[Vec3, Vec3]:
+def supporting_hull_edge(system: int, hull: int, d: Vec3, sine: float) -> tuple[Vec3, Vec3]:
     """Middle, m, and half vector of the edge at the vertex farthest along d that is most nearly
-    perpendicular to d; the half is 0 where none is.
+    perpendicular to d; the half is 0 where none is up to this ``sine`` of an angle.
     """
     s = system_at(system)
     top, begin = supporting_vertex(s, hull, d), s.hulls[hull].first_vertex
-    least, half, corner = FEATURE_SINE, (0.0, 0.0, 0.0), vec(s.hull_vertices[top].point)
+    least, half, corner = sine, (0.0, 0.0, 0.0), vec(s.hull_vertices[top].point)
     first, end = hull_edges(system, hull)
     for i in range(first, end):
         for k in range(2):
             if begin + s.hull_edges[i].corners[k] != top:
                 continue
             edge = sub(vec(s.hull_vertices[begin + s.hull_edges[i].corners[1 - k]].point), corner)
-            sine = abs(dot(edge, d)) / norm(edge)
-            if sine < least:
-                least, half = sine, scale(0.5, edge)
+            found = abs(dot(edge, d)) / norm(edge)
+            if found < least:
+                least, half = found, scale(0.5, edge)
     return add(corner, half), half

@@ -183,10 +183,10 @@ def is_beside(found: LimitedAxis, radius: float) -> bool:
 
 
 @compiled
-def is_explained(found: LimitedAxis) -> bool:
-    """Whether what the edges allow separates a shape from a triangle nearly as well as any axis: by
-    as much to rounding, or if they overlap by half of it. In a notch of two edges that meet, what
-    lies on both is past the end of each, by its depth times a slope.
+def is_contact_axis(found: LimitedAxis) -> bool:
+    """Whether the allowed axis is that of a contact: it separates as much as any axis, to rounding,
+    or where shape and triangle overlap, not twice as deeply. In a notch of two edges that meet,
+    what lies on both is past the end of each, by its depth times a slope.
     """
     return found.allowed > min(found.distance, 2 * found.distance) - IS_DISTANCE
 
@@ -205,7 +205,7 @@ def triangle_separation(a: Shape, t: Shape, cutoff: float) -> float:
     distance, gap = found.distance - radius, found.allowed - radius
     if is_beside(found, radius):
         return max(distance, -BARELY)
-    if distance > gap and not is_explained(found):
+    if distance > gap and not is_contact_axis(found):
         share = min(max(distance / REACH, 0.0), 1.0)
         return max(gap, distance - REACH, BARELY * share * share + min(max(distance, -BARELY), 0.0))
     return gap

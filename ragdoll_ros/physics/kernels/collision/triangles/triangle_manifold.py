@@ -20,7 +20,7 @@ from ..manifold import CLIP_VERTEX, merge_points, reduce_points, sort_points
 from ..separating_axis import FACE_BIAS, FACE_BIAS_RATIO
 from ..shapes import BOX, CAPSULE, HULL, SPHERE, Shape, bounding_radius
 from .limited_axis import (FACE, FIRST_CORNER, LimitedAxis, core_radius, hull_bounds, is_beside,
-                           is_explained, limited_axis)
+                           is_contact_axis, limited_axis)
 from .triangle import FLAT, Corners, corners_of, edge_vectors, supporting_corner
 
 WIDER = 1 + 1e-9
@@ -61,7 +61,7 @@ def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -
         middle, u = a_edge(a, arm, n)
         other, v = triangle_edge(corners, feature)
         count = clipped = clip_edges(middle, u, other, v, n, points)
-    if clipped == 0 and is_explained(found):
+    if clipped == 0 and is_contact_axis(found):
         middle, u = a_edge(a, arm, n)
         if feature == FACE:
             middle = add_scaled(middle, -s / 2, n)
