@@ -7,6 +7,7 @@ angular momentum.
 """
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +27,16 @@ class Sliding:
     axial: float = 0.0
     """kg m^2: about x, the axis of a roller."""
     rolls: bool = False
+
+    @cached_property
+    def weights(self):
+        """(3, k): what takes means over the points of something, and of its products with x, y."""
+        return np.stack([np.ones(len(self.points)), *self.points.T]) / len(self.points)
+
+    @cached_property
+    def spread(self):
+        """(2, 2) 1/m^2: from the center of pressure to the slopes of the pressure."""
+        return np.linalg.pinv(self.weights[1:] @ self.points)
 
 
 def disc(radius, thickness, rings=40):
@@ -54,25 +65,32 @@ def capsule(radius, length, cells=200):
 
 
 def accelerations(body, friction, state):
-    """Rates of x, y, angle, velocity (2,), spin, and spin about the axis of a roller."""
+    """Rates of x, y, angle, velocity (2,), spin, and spin about the axis of a roller.
+
+    With a pressure 1 + a x + b y force and torque are affine in (a, b): their sums over the points
+    are taken once, and (a, b) is iterated.
+    """
     angle, velocity, spin, roll = state[2], state[3:5], state[5], state[6]
     cosine, sine = math.cos(angle), math.sin(angle)
     frame = np.array(((cosine, sine), (-sine, cosine)))
-    slip = frame @ velocity + spin * np.stack([-body.points[:, 1], body.points[:, 0]], axis=-1)
+    x, y = body.points.T
+    along, aside = frame @ velocity
+    slips = np.stack([along - spin * y, aside + spin * x])
     if body.rolls:
-        slip[:, 1] += body.height * roll
-    directions = slip / np.maximum(np.hypot(slip[:, 0], slip[:, 1]), 1e-12)[:, None]
-    spread = np.linalg.pinv(body.points.T @ body.points / len(body.points))
-    pressure = np.ones(len(body.points))
+        slips[1] += body.height * roll
+    directions = slips / np.maximum(np.sqrt((slips ** 2).sum(axis=0)), 1e-12)
+    across = x * directions[1] - y * directions[0]
+    # Mean direction and mean of the lever, for a pressure of 1, of x and of y.
+    uniform, tilted = directions @ body.weights[0], directions @ body.weights[1:].T
+    tilt = np.zeros(2)
     for _ in range(6):
-        force = -friction * G * (pressure[:, None] * directions).mean(axis=0)
+        force = -friction * G * (uniform + tilted @ tilt)
         center = -body.height * force / G
         if body.rolls:
             center = np.array((center[0] - body.axial * roll * spin / G, 0.0))
-        pressure = 1 + body.points @ (spread @ center)
-    assert pressure.min() > 0
-    x, y = body.points.T
-    torque = -friction * G * (pressure * (x * directions[:, 1] - y * directions[:, 0])).mean()
+        tilt = body.spread @ center
+    assert (1 + body.points @ tilt).min() > 0
+    torque = -friction * G * (across @ body.weights.T @ (1.0, *tilt))
     rolling = body.height * force[1] / body.axial if body.rolls else 0.0
     return np.concatenate([velocity, [spin], frame.T @ force, [torque / body.inertia, rolling]])
 
