@@ -61,6 +61,12 @@ BLIND = """for (const name of ['clear', 'drawArrays', 'drawArraysInstanced', 'dr
 """The page computes each picture and draws nothing of it: without a GPU, to draw takes three
 quarters of the time of a processor that a page takes."""
 
+DRAW = """async () => {
+  window.ragdollDraws = true;
+  window.__viserMutable.requestRender();
+  for (let frame = 0; frame < 2; frame++) await new Promise(requestAnimationFrame);
+}"""
+
 BODIES = """() => {
   const {scene, nodeRefFromName: nodes} = window.__viserMutable;
   scene.updateMatrixWorld();
@@ -179,8 +185,8 @@ class View:
 
     @contextmanager
     def drawing(self):
-        """For somebody who looks at the picture: meanwhile it is drawn."""
-        self.page.evaluate('window.ragdollDraws = true')
+        """For somebody who looks at the picture: it is drawn now, and again as it changes."""
+        self.page.evaluate(DRAW)
         yield
         self.page.evaluate('window.ragdollDraws = false')
 

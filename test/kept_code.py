@@ -5,6 +5,7 @@ A file's name has a digest of all kernels, of the test's file and of the types o
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 from pathlib import Path
 
@@ -37,8 +38,10 @@ class KeptCode(KernelCache):
                 _keep(self._path_for(sig), machine_code(data._reduce()))
 
 
-def kept(function):
-    """As numba.njit; a later process loads what the first has compiled."""
-    dispatcher = numba.njit(function)
+def kept(function=None, **options):
+    """As numba.njit, of a module's function; a later process loads what the first has compiled."""
+    if function is None:
+        return functools.partial(kept, **options)
+    dispatcher = numba.njit(function, **options)
     dispatcher._cache = KeptCode(function)
     return dispatcher

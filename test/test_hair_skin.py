@@ -209,14 +209,21 @@ SKINNED = """() => {
 """Vertices of each skin as the graphics card places them, world frame, z up."""
 
 
-def test_the_page_moves_the_hair(run):
-    """The vertices that three.js skins, of both, at the end of the run."""
+@pytest.fixture(scope='module')
+def browser():
     pytest.importorskip('viser')
-    from browser import View, chromium
+    from browser import chromium
+    with chromium() as context:
+        yield context
+
+
+def test_the_page_moves_the_hair(run, browser):
+    """The vertices that three.js skins, of both, at the end of the run."""
+    from browser import View
     from page_client import served
 
     from ragdoll_ros.viewer.sources.playback import PlaybackSource
-    with served(PlaybackSource(run.recording)) as page, chromium() as browser:
+    with served(PlaybackSource(run.recording)) as page:
         view = View(browser, f'http://127.0.0.1:{page.server.get_port()}')
         view.wait(lambda: page.timeline.clip is not None)
         page.timeline.go_to(run.recording.duration)

@@ -6,17 +6,23 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-numba = pytest.importorskip('numba')
-from ragdoll_ros.physics.kernels.maths import oscillator  # noqa: E402
+pytest.importorskip('numba')
+from kept_code import kept
+
+from ragdoll_ros.physics.kernels.maths import oscillator
 
 STEP = 0.01
+
+
+@kept(error_model='numpy')
+def _response(w, c, h):
+    return oscillator.oscillator_response(w, c, h)
 
 
 @pytest.fixture(scope='module')
 def response():
     """The kernels' function as Python calls it."""
-    function = oscillator.oscillator_response
-    return numba.njit(lambda w, c, h: function(w, c, h), error_model='numpy')
+    return _response
 
 
 @pytest.mark.parametrize(('phase', 'ratio'), list(itertools.product(

@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip('numba', reason='numba is not installed: there is no rigid engine')
 
-import numba
+from kept_code import kept
 
 from ragdoll_ros.physics.kernels.maths.anderson import accelerate, make_anderson
 from ragdoll_ros.physics.kernels.maths.minimum_degree import find_order, make_minimum_degree
@@ -17,7 +17,7 @@ from ragdoll_ros.physics.kernels.maths.sparse_lu import (
 )
 
 
-@numba.njit
+@kept
 def solve_sparse(lu, a, b, m):
     """Solve a x = b in place, where m cliques have entries; returns the work, or -1."""
     n = len(b)
@@ -92,7 +92,7 @@ def test_a_matrix_without_a_pivot_is_refused():
     assert solve_sparse(loaded([np.arange(2)], 2), A, np.ones(2), 1) == -2
 
 
-@numba.njit
+@kept
 def find(nodes, n):
     find_order(nodes, n)
 
@@ -117,7 +117,7 @@ def test_the_order_of_elimination_is_that_of_minimum_degree():
     assert not near
 
 
-@numba.njit
+@kept
 def iterate(slope, c, p, memory, weights, turns, accelerated):
     """Map p to slope p + c so many times; z = 2 p."""
     n = len(p)

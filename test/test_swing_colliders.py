@@ -146,8 +146,7 @@ def distance(point, axis):
 
 
 def inside(mount, states, positions):
-    """How deep, m, the masses at (t, n, 3) m are within the colliders, the most; below 0 outside.
-    """
+    """How deep, m, masses at (t, n, 3) m are within the colliders, the most; below 0 outside."""
     places = np.array([state.positions for state in states])
     turns = np.array([state.orientations for state in states])
     deepest = -np.inf

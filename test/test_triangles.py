@@ -1,9 +1,9 @@
 """Narrow phase of triangles: distances and normals against minimization of the distance."""
 from __future__ import annotations
 
-import numba
 import numpy as np
 import pytest
+from kept_code import kept
 from scipy.optimize import minimize
 from test_collision import HULLS, ROWS, TABLES
 
@@ -35,7 +35,7 @@ FACES = slice(TABLES.hulls['first_face'][STONE],
               TABLES.hulls['first_face'][STONE] + TABLES.hulls['face_count'][STONE])
 
 
-@numba.njit(error_model='numpy')
+@kept(error_model='numpy')
 def measure(a, b, margin, out):
     return separation(a, b, 3.0), collide(a, b, margin, out)
 

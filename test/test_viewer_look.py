@@ -49,13 +49,6 @@ SHADOWS = """cast => {
 }"""
 
 
-DRAW = """async () => {
-  window.__viserMutable.requestRender();
-  for (let frame = 0; frame < 2; frame++) await new Promise(requestAnimationFrame);
-}"""
-"""Draws a picture, and waits until it is there."""
-
-
 @pytest.fixture(scope='module')
 def seen():
     """A page at its start, paused, and the view of it with all that a user sees."""
@@ -78,7 +71,6 @@ def still(view):
     taken = []
 
     def same():
-        view.page.evaluate(DRAW)
         taken.append(view.page.screenshot())
         return len(taken) > 1 and taken[-1] == taken[-2]
 

@@ -130,7 +130,13 @@ def colors_of(content, corners):
     return np.concatenate(colors)[nearest]
 
 
-def test_limbs_have_their_colours_on_the_page(run):
+@pytest.fixture(scope='module')
+def browser():
+    with chromium() as context:
+        yield context
+
+
+def test_limbs_have_their_colours_on_the_page(run, browser):
     """As a fall goes on: what the page draws where trimesh, which reads the recording's glTF and
     casts a ray at each triangle, sees one of a limb. Means of each limb within 10 %.
     """
@@ -138,15 +144,16 @@ def test_limbs_have_their_colours_on_the_page(run):
     recording, skin = run
     pose = recording.pose(40)
     content = gltf_bytes(recording)
-    with served(PlaybackSource(recording)) as page, chromium(draws=True) as browser:
+    with served(PlaybackSource(recording)) as page:
         view = View(browser, f'http://127.0.0.1:{page.server.get_port()}')
         view.page.set_viewport_size({'width': 1280, 'height': 800})
         view.wait(lambda: page.timeline.clip is not None)
         page.timeline.go_to(0.4)
         view.wait(lambda: page.frame is not None and page.frame.time == 0.4)
         view.wait(lambda: view.page.evaluate(PAINTED))
-        view.page.evaluate(PICTURES)
-        picture = iio.imread(view.page.screenshot())[..., :3].astype(float)
+        with view.drawing():
+            view.page.evaluate(PICTURES)
+            picture = iio.imread(view.page.screenshot())[..., :3].astype(float)
         eye = np.array(view.page.evaluate(EYE))
         whole = trimesh.Trimesh(posed(skin, pose), skin.triangles, process=False)
         middles = whole.triangles_center
@@ -169,14 +176,13 @@ def test_limbs_have_their_colours_on_the_page(run):
         assert np.linalg.norm(mean - wanted) < 0.1 * np.linalg.norm(wanted), (words, mean, wanted)
 
 
-def test_a_page_without_a_server_has_them_too(run, tmp_path):
+def test_a_page_without_a_server_has_them_too(run, browser, tmp_path):
     recording, _ = run
     path = save_static(recording, tmp_path)
-    with chromium(draws=True) as browser:
-        view = View(browser, path.as_uri())
-        view.wait(lambda: view.page.evaluate(PAINTED))
-        assert not view.errors
-        view.close()
+    view = View(browser, path.as_uri())
+    view.wait(lambda: view.page.evaluate(PAINTED))
+    assert not view.errors
+    view.close()
 
 
 def test_materials_and_images_are_read_as_they_are(run, tmp_path):

@@ -69,7 +69,7 @@ def scenes(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def seen(scenes):
-    with served(SimulationSource(scenes['drop'])) as page, chromium(draws=True) as browser:
+    with served(SimulationSource(scenes['drop'])) as page, chromium() as browser:
         view = View(browser, f'http://127.0.0.1:{page.server.get_port()}', SIZE)
         view.wait(lambda: page.editor is not None)
         yield Seen(page, view)
@@ -104,8 +104,9 @@ class Seen:
 
     def picture(self):
         """Colours (h, w, 3) of the page."""
-        self.view.page.evaluate(PICTURES)
-        return iio.imread(self.view.page.screenshot())[..., :3].astype(int)
+        with self.view.drawing():
+            self.view.page.evaluate(PICTURES)
+            return iio.imread(self.view.page.screenshot())[..., :3].astype(int)
 
     def drawn(self):
         """The picture, and where it is no background (h, w) bool."""
