@@ -189,7 +189,7 @@ def depth(placed, state):
     """
     surface = placed.bodies[0].shape.triangles
     vertices, _ = placed.bodies[0].shape.mesh()
-    deepest = 0.0
+    deepest, corners = 0.0, []
     for bone, row in zip(placed.bones, state.rows, strict=True):
         for part in bone.shape.parts:
             position = row[:3] + rotation.rotate(row[3:7], np.array(part.position))
@@ -197,20 +197,21 @@ def depth(placed, state):
             local = rotation.rotate(rotation.inverse(turn), vertices - position)
             deepest = max(deepest, -part.shape.signed_distance(local).min())
             if part.kind == 'box':
-                for corner in position + rotation.rotate(turn, part.shape.mesh()[0]):
-                    deepest = max(deepest, below(surface, corner))
-    return deepest
+                corners.append(position + rotation.rotate(turn, part.shape.mesh()[0]))
+    return max(deepest, below(surface, np.concatenate(corners)))
 
 
-def below(surface, point):
-    """Depth, m, of a point below the triangle over or under it."""
+def below(surface, points):
+    """Depth, m, of the deepest of points (p, 3) m below the triangles over or under them."""
     a, b, c = np.moveaxis(surface.corners, 1, 0)
+    x, y, _ = points.T[:, :, None]
 
     def turned(u, v):
-        return ((v - u)[:, 0] * (point[1] - u[:, 1]) - (v - u)[:, 1] * (point[0] - u[:, 0])) >= 0
-    inside = turned(a, b) & turned(b, c) & turned(c, a)
-    heights = np.einsum('ij,ij->i', point - a, surface.normals)
-    return -heights[inside].min() if inside.any() else 0.0
+        along = v - u
+        return along[:, 0] * (y - u[:, 1]) - along[:, 1] * (x - u[:, 0]) >= 0
+    point, face = np.nonzero(turned(a, b) & turned(b, c) & turned(c, a))
+    heights = np.einsum('ij,ij->i', points[point] - a[face], surface.normals[face])
+    return -heights.min(initial=0.0)
 
 
 def test_edges_know_by_how_much_the_surface_bends():
