@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-numba = pytest.importorskip('numba')
+pytest.importorskip('numba')
+from kept_code import kept
 
-from ragdoll_ros.physics.kernels.maths import vectors  # noqa: E402
+from ragdoll_ros.physics.kernels.maths import vectors
 
 RNG = np.random.default_rng(0)
 A, B = (tuple(row) for row in RNG.normal(size=(2, 3)))
@@ -17,10 +18,10 @@ MATRIX = Rotation.from_quat(Q).as_matrix()
 
 def called(function, *arguments):
     """The value of a function that only compiled code can call."""
-    @numba.njit
     def call(arguments):
         return function(*arguments)
-    return call(arguments)
+    call.__qualname__ = f'call_{function.__name__}'
+    return kept(call)(arguments)
 
 
 @pytest.mark.parametrize('name, arguments, expected', [
