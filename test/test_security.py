@@ -1,5 +1,6 @@
 """What the code does with what comes from outside, read from the code."""
 import ast
+import functools
 from pathlib import Path
 
 import pytest
@@ -31,9 +32,15 @@ WRITERS = {
 """Files that write files, and what says where."""
 
 
+@functools.cache
+def syntax(path):
+    """Syntax tree of a file."""
+    return ast.parse(path.read_text())
+
+
 def calls(path):
     """Calls in a file: what is called, its last name and the call."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(syntax(path)):
         if isinstance(node, ast.Call):
             name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(
                 node.func, 'id', '')
@@ -69,7 +76,7 @@ def test_what_counts_as_writing(tmp_path, code, found):
 
 def imported(path):
     """Modules that a file imports, by the first part of their names."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(syntax(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name.split('.')[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
