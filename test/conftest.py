@@ -28,21 +28,25 @@ collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
                        if importlib.util.find_spec(package) is None for file in files]
 
 
-LONGEST = ('test_falls_run.py', 'test_ros_teleop.py', 'test_viewer_browser.py',
-           'test_viewer_look.py', 'test_ros_stamps.py', 'test_planar_rods.py',
-           'test_ros_viewer.py', 'test_ros_programs.py', 'test_sliding_patches.py',
-           'test_viewer_seen.py', 'test_ros_process.py', 'test_collision.py',
-           'test_viewer_walks.py', 'test_swing.py', 'test_fit_split_characters.py',
-           'test_package.py', 'test_viewer_typed.py', 'test_viewer_editing.py',
-           'test_fit_wild.py', 'test_viewer_crowd.py', 'test_editor.py',
-           'test_viewer_amiss.py', 'test_fit_rigs.py', 'test_ros_browser.py', 'test_guard.py',
-           'test_fit_wrists.py', 'test_contact.py',
-           'test_viewer_paint.py', 'test_dynamics.py', 'test_tutorial.py', 'test_grab.py',
-           'test_viewer_command.py', 'test_drive.py', 'test_ros_parameters.py', 'test_report.py',
-           'test_ros_inputs.py', 'test_clusters.py', 'test_without_numba.py', 'test_fit_saved.py',
-           'test_ros_signals.py', 'test_security.py', 'test_ros_replay.py', 'test_kernel_cache.py',
-           'test_ros_full_disk.py', 'test_fainting_falls.py', 'test_simulation.py', 'test_falls.py',
-           'test_compiled_cache.py')
+LONGEST = ('test_ros_viewer.py', 'test_viewer_seen.py', 'test_viewer_browser.py', 'test_heaps.py',
+           'test_viewer_editing.py', 'test_viewer_accessibility.py', 'test_ros_teleop.py',
+           'test_viewer_transport.py', 'test_viewer_limp.py', 'test_falls_run.py',
+           'test_viewer_look.py', 'test_viewer_walks.py', 'test_ros_stamps.py',
+           'test_hull_decomposition.py', 'test_ros_motor_slider.py', 'test_fit_wild.py',
+           'test_moving_hulls.py', 'test_limp.py', 'test_hair_skin.py', 'test_package.py',
+           'test_viewer_motors.py', 'test_viewer_crowd.py', 'test_ros_browser.py',
+           'test_falls_formats.py', 'test_ros_process.py', 'test_animations.py',
+           'test_viewer_typed.py', 'test_surfaces.py', 'test_viewer.py', 'test_collision.py',
+           'test_viewer_amiss.py', 'test_dynamics.py', 'test_ros_programs.py',
+           'test_static_bodies.py', 'test_viewer_paint.py', 'test_editor.py',
+           'test_ros_pushing.py', 'test_solver.py', 'test_viewer_timeline.py',
+           'test_recordings_character.py', 'test_viewer_pushing.py', 'test_readme.py',
+           'test_tutorial.py', 'test_fit_split_characters.py', 'test_ros_signals.py',
+           'test_swing_colliders.py', 'test_ros_parameters.py', 'test_viewer_command.py',
+           'test_ros_fuzz.py', 'test_add_remove.py', 'test_falls.py', 'test_swing.py',
+           'test_peers.py', 'test_compiled_cache.py', 'test_ros_full_disk.py',
+           'test_without_numba.py', 'test_ros_replay.py', 'test_fit_command.py',
+           'test_viewer_static.py', 'test_viewer_time.py')
 """Those that work and those that wait in turn, so that both keep the processors busy."""
 
 
