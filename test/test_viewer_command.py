@@ -25,11 +25,6 @@ from ragdoll_ros.viewer.command import folder_for_files, is_public, main, server
 COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
 
 
-def run(*arguments):
-    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, cwd=ROOT,
-                          env=light(), timeout=PATIENCE)
-
-
 def start(*arguments):
     """Start it; give the process and the port of the address that it prints."""
     process = subprocess.Popen([*COMMAND, *arguments], stdout=subprocess.PIPE, text=True, cwd=ROOT,
@@ -48,20 +43,40 @@ def places_of(port):
     return [place for place in listening if place.endswith(f':{port:04X}')]
 
 
-def test_a_character_is_no_scene_and_how_to_make_one_is_said(tmp_path):
+@pytest.fixture
+def signals():
+    """The command takes the signals of its process: they are given back."""
+    before = {sign: signal.getsignal(sign) for sign in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for sign, handler in before.items():
+        signal.signal(sign, handler)
+
+
+@pytest.fixture
+def ended(signals, capsys):
+    """Call it in this process; gives its exit code, and what it prints on both streams."""
+    def call(*arguments):
+        try:
+            code = main(list(arguments))
+        except SystemExit as error:
+            code = error.code
+        return code, *capsys.readouterr()
+    return call
+
+
+def test_a_character_is_no_scene_and_how_to_make_one_is_said(ended, tmp_path):
     path = tmp_path / 'fox.glb'
     path.write_bytes(b'glTF' + bytes(range(128, 256)))
-    done = run('--scene', str(path), '--port', '0')
-    assert done.returncode == 2 and f'ragdoll_fit {path}' in done.stderr
-    assert 'utf-8' not in done.stderr
+    code, _, said = ended('--scene', str(path), '--port', '0')
+    assert code == 2 and f'ragdoll_fit {path}' in said
+    assert 'utf-8' not in said
 
 
-def test_what_cannot_be_played_leaves_no_folder(tmp_path):
+def test_what_cannot_be_played_leaves_no_folder(ended, monkeypatch, tmp_path):
     (tmp_path / 'bad.mcap').write_text('bad')
-    done = subprocess.run([*COMMAND, '--play', str(tmp_path / 'bad.mcap')], capture_output=True,
-                          text=True, cwd=ROOT, env={**light(), 'HOME': str(tmp_path)},
-                          timeout=PATIENCE)
-    assert done.returncode == 2 and [path.name for path in tmp_path.iterdir()] == ['bad.mcap']
+    monkeypatch.setenv('HOME', str(tmp_path))
+    code, *_ = ended('--play', str(tmp_path / 'bad.mcap'))
+    assert code == 2 and [path.name for path in tmp_path.iterdir()] == ['bad.mcap']
 
 
 SIGNS = pytest.mark.parametrize('sign', [signal.SIGINT, signal.SIGTERM])
@@ -145,15 +160,6 @@ def test_a_port_of_the_system_is_for_root_alone():
     assert '--port 80' in said and 'root' in said and '1024' in said
 
 
-@pytest.fixture
-def signals():
-    """The command takes the signals of its process: they are given back."""
-    before = {sign: signal.getsignal(sign) for sign in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for sign, handler in before.items():
-        signal.signal(sign, handler)
-
-
 @pytest.mark.parametrize(('arguments', 'words'), [
     (('--scene', 'nowhere'), ['nowhere', 'drop']),
     (('--scene', 'drop', '--host', '203.0.113.1'), ['203.0.113.1', 'address']),
@@ -170,12 +176,8 @@ def signals():
     (('--engine', 'bullet'), ['--engine', '--scene']),
     (('--scene', 'drop', '--ros-args', '-r', '__ns:=/a'), ['--ros-args', '--scene']),
     (('--scene', 'drop', '--folder', '/dev/null/x'), ['/dev/null/x', 'folder'])])
-def test_refuses_with_exit_code_two(arguments, words, signals, capsys):
-    try:
-        code = main(list(arguments))
-    except SystemExit as error:
-        code = error.code
-    said = capsys.readouterr().err
+def test_refuses_with_exit_code_two(arguments, words, ended):
+    code, _, said = ended(*arguments)
     assert code == 2 and all(word in said for word in words), said
 
 
@@ -221,15 +223,15 @@ def test_a_signal_is_heard_within_a_wait_for_it():
 
 
 def test_a_wrong_option_ends_the_process_with_two():
-    done = run('--nonsense')
+    done = subprocess.run([*COMMAND, '--nonsense'], capture_output=True, text=True, cwd=ROOT,
+                          env=light(), timeout=PATIENCE)
     assert done.returncode == 2 and '--nonsense' in done.stderr and 'Traceback' not in done.stderr
 
 
-def test_a_broken_scene_is_refused_with_all_its_errors(broken_scene):
+def test_a_broken_scene_is_refused_with_all_its_errors(ended, broken_scene):
     path, words = broken_scene
-    done = run('--scene', str(path))
-    assert done.returncode == 2 and all(word in done.stderr for word in words)
-    assert 'Traceback' not in done.stderr
+    code, _, said = ended('--scene', str(path))
+    assert code == 2 and all(word in said for word in words)
 
 
 @pytest.mark.parametrize(('missing', 'word', 'arguments'), [
@@ -254,9 +256,9 @@ def test_what_to_install_is_said_before_machine_code_is_made():
     assert done.returncode == 0 and 'ragdoll_ros[viewer]' in done.stderr, done.stderr
 
 
-def test_help_has_examples():
-    done = run('--help')
-    assert done.returncode == 0 and 'ragdoll_viewer --scene doll.yaml' in done.stdout
+def test_help_has_examples(ended):
+    code, said, _ = ended('--help')
+    assert code == 0 and 'ragdoll_viewer --scene doll.yaml' in said
 
 
 def test_a_page_of_a_recording_or_a_node_needs_no_engine():
