@@ -94,7 +94,7 @@ def test_a_tap_gives_a_metre_a_second_to_a_node_of_any_name(peer, where):
     0.4 m/s each. The first may come before the node has found the teleop.
     """
     name = ('/stage' if len(where) > 2 else '') + '/puppet'
-    node = start('node', '--ros-args', *where, '-p', 'scene:=flight')
+    node = start('node', '--ros-args', *where, '-p', 'scene:=flight', compiled=True)
     states = peer.collect(MultiDOFJointState, f'{name}/state')
     peer.wait(lambda: states)
     process, terminal = start_on_terminal('teleop.teleop')
@@ -130,7 +130,7 @@ def test_a_held_key_goes_to_the_top_speed_and_not_beyond(peer):
     """2 s in free space, where 2000 N would make 70 m/s of it. + and - change the speed."""
     # Slow motion: a busy machine delays states and pushes by little simulated time.
     node = start('node', '--ros-args', '-r', '__node:=runner', '-p', 'scene:=flight', '-p',
-                 'real_time_factor:=0.25')
+                 'real_time_factor:=0.25', compiled=True)
     states = peer.collect(MultiDOFJointState, '/runner/state')
     peer.wait(lambda: states)
     process, terminal = start_on_terminal('teleop.teleop', '/runner', '--top-speed', '2')
@@ -161,7 +161,7 @@ def test_a_top_speed_out_of_range_is_refused(peer):
 def test_of_several_nodes_a_user_says_which(peer):
     for name in ('one', 'other'):
         start('node', '--ros-args', '-r', f'__node:={name}', '-r', '__ns:=/two', '-p',
-              'scene:=flight')
+              'scene:=flight', compiled=True)
     sent = peer.collect(Wrench, '/two/other/force')
     peer.wait(lambda: all(peer.count_publishers(f'/two/{name}/poses') for name in ('one', 'other')))
     finder = NodeFinder(peer, '')

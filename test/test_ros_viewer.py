@@ -66,7 +66,7 @@ def remote(ros):
 def node(nodes, peer):
     """The node in the default scene as it begins: another one only where the last was killed."""
     if not nodes or nodes[-1].poll() is not None:
-        nodes.append(start('node'))
+        nodes.append(start('node', compiled=True))
     yield nodes[-1]
     if nodes[-1].poll() is None:
         assert set_parameters(peer, scene='drop', real_time_factor=1.0)
@@ -137,7 +137,7 @@ def test_no_node_is_said_and_heals_by_itself(no_node, nodes, remote):
     wait(lambda: 'no node' in remote.status.problem and 'ragdoll_node' in remote.status.problem)
     with pytest.raises(ValueError, match='no node'):
         remote.load('drop')
-    nodes.append(start('node'))
+    nodes.append(start('node', compiled=True))
     seen(remote)
     assert not remote.status.problem
 
@@ -513,7 +513,7 @@ def test_an_open_page_follows_a_node_that_comes_back_with_another_scene(
     kill(node)
     wait(lambda: 'silent' in page.problem.content and 'start it again' in page.problem.content)
     wait(lambda: 'No messages' in page.settings.health.dot.content)
-    start('node', '--ros-args', '-p', 'scene:=crowd')
+    start('node', '--ros-args', '-p', 'scene:=crowd', compiled=True)
     wait(lambda: page.stage.scene == load_scene('crowd'))
     wait(lambda: not page.problem.content)
     page.source.pause(True)
