@@ -21,14 +21,15 @@ from ragdoll_ros.ros.messages.measures import (
 )
 from ragdoll_ros.ros.teleop.status_line import StatusLine
 
-MEASURES = TickMeasures(12_030_000_000, 1_764_000_000_123_456_789, 'deadbeef', -503.125, 1e-9, 0.0)
+MEASURES = TickMeasures(12_030_000_000, 1_764_000_000_123_456_789, 'deadbeef', 'cafe0123', -503.125,
+                        1e-9, 0.0)
 
 
 @pytest.mark.parametrize('name', ['', '/ragdoll', '/a/b', '/a/bc', '/left/ragdoll'])
 def test_the_bytes_are_those_of_rclpy(name):
     stamp = 1_764_000_001_000_000_007
-    values = {'simulated_time': '12.030000000', 'run': '1764000000123456789',
-              'urdf_crc32': 'deadbeef', 'energy_excess_J': '-503.125',
+    values = {'run': '1764000000123456789', 'urdf_crc32': 'deadbeef', 'scene_crc32': 'cafe0123',
+              'simulated_time': '12.030000000', 'energy_excess_J': '-503.125',
               'work_of_pushes_J': '1e-09', 'work_of_grabs_J': '0'}
     message = DiagnosticArray(status=[DiagnosticStatus(
         level=DiagnosticStatus.OK, name=name,
@@ -52,7 +53,7 @@ def test_time_and_energy_of_each_tick_are_the_simulations(make_node, peer):
     """Of the poses with the same stamp; a reset is another run."""
     got, poses = peer.collect(DiagnosticArray, 'ragdoll/measures'), peer.collect(
         PoseArray, 'ragdoll/poses')
-    urdf = peer.collect(String, 'robot_description')
+    urdf, scene = (peer.collect(String, topic) for topic in ('robot_description', 'ragdoll/scene'))
     node = make_node(start_paused=True)
     peer.executor_.add_node(node)
     for topic in ('/ragdoll/measures', '/ragdoll/poses', '/robot_description'):
@@ -71,6 +72,7 @@ def test_time_and_energy_of_each_tick_are_the_simulations(make_node, peer):
     places = {message.header.stamp.sec * 10 ** 9 + message.header.stamp.nanosec: message.poses[0]
               for _, message in poses}
     assert {measures.urdf for _, measures in found} == {checksum(urdf[-1][1].data)}
+    assert {measures.scene for _, measures in found} == {checksum(scene[-1][1].data)}
     assert [measures.run for _, measures in found[-6:-1]] == [found[-2][1].run] * 5
     assert found[-1][1].run > found[-2][1].run
     with Simulation(load_scene('drop')) as simulation:

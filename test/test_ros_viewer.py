@@ -23,13 +23,19 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
+from ragdoll_ros.files.run_scene import run_scene_text
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf import scene_to_urdf
 from ragdoll_ros.model.errors import RagdollError
 from ragdoll_ros.model.shapes import Sphere
+from ragdoll_ros.ros.latched_topic import LATCHED_HISTORY
 from ragdoll_ros.ros.messages.convert import to_pose_array
+from ragdoll_ros.ros.messages.measures import TickMeasures, checksum, serialize_measures
 from ragdoll_ros.ros.messages.serialized import deserialize_pose_array
 from ragdoll_ros.viewer.sources.node import source as remote_source
+from ragdoll_ros.viewer.sources.node.frames import NodeFrames
+from ragdoll_ros.viewer.sources.node.hands import NodeHands
+from ragdoll_ros.viewer.sources.node.pushes import ObservedPushes
 from ragdoll_ros.viewer.sources.node.scene import scene_of_node
 from ragdoll_ros.viewer.sources.node.source import NodeSource
 from ragdoll_ros.viewer.sources.source import RequestedData
@@ -170,7 +176,7 @@ def test_shows_what_the_node_publishes(node, remote, peer):
 def test_listens_to_what_is_shown_alone(node, remote, peer):
     remote.request(RequestedData())
     topics = ('ragdoll/poses', 'ragdoll/contacts', 'joint_states', 'ragdoll/swings',
-              'robot_description')
+              'ragdoll/scene', 'robot_description')
 
     def listened():
         return [topic for topic in topics if peer.count_subscribers(topic)]
@@ -179,7 +185,7 @@ def test_listens_to_what_is_shown_alone(node, remote, peer):
     peer.wait(lambda: listened() == [])
     remote.request(OPEN)
     seen(remote)
-    peer.wait(lambda: listened() == ['ragdoll/poses', 'robot_description'])
+    peer.wait(lambda: listened() == ['ragdoll/poses', 'ragdoll/scene', 'robot_description'])
     assert remote.frame.contacts is None and remote.frame.angles is None
     remote.request(RequestedData(frames=True, contacts=True, angles=True))
     wait(lambda: remote.frame.contacts is not None and remote.frame.angles is not None)
@@ -412,26 +418,77 @@ def test_a_node_takes_a_fixed_root_unless_its_engine_cannot(no_node, nodes, remo
     end(nodes[-1], signal.SIGINT)
 
 
-def test_a_scene_that_is_not_here_is_shown_by_its_urdf(node, remote, peer, tmp_path):
-    """The file is another one by now: what the node took is what is shown."""
+def test_a_file_that_is_another_one_by_now_changes_nothing(node, remote, peer, tmp_path):
+    """What the node took is what is shown, to the last field."""
     path, scene = tmp_path / 'mine.yaml', load_scene('crowd')
     save_scene(scene, path)
     assert set_parameters(peer, scene=str(path))
     save_scene(load_scene('drop'), path)
     remote.request(OPEN)
     wait(lambda: remote.frame is not None)
-    assert 'robot_description' in remote.status.note
+    assert not remote.status.note and remote.frame.scene == scene
+
+
+def test_a_scene_whose_files_are_not_here_is_shown_by_its_urdf(no_node, nodes, remote, peer,
+                                                               tmp_path):
+    """As on another machine, which has no mesh of the node's."""
+    pytest.importorskip('numba')
+    nodes.append(start('node', compiled=True))
+    (tmp_path / 'wedge.obj').write_text('v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n'
+                                        'f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n')
+    path = tmp_path / 'mine.yaml'
+    path.write_text('dolls: [{doll: doll, position: [3, 0, 1]}]\nground: {}\n'
+                    'bodies: [{name: wedge, shape: {mesh: {file: wedge.obj}}}]\n')
+    assert set_parameters(peer, scene=str(path))
+    (tmp_path / 'wedge.obj').unlink()
+    remote.request(OPEN)
+    wait(lambda: remote.frame is not None)
+    assert 'robot_description' in remote.status.note and 'expected a file' in remote.status.note
+    scene = load_scene('drop')
     assert remote.frame.scene.bone_names == scene.bone_names
     assert np.allclose([bone.shape.half_extents for bone in remote.frame.scene.bones],
                        [bone.shape.half_extents for bone in scene.bones])
+
+
+def test_no_frame_has_the_scene_before(peer):
+    """Of two whose URDFs are equal: the poses of one are no frame of the other, but wait."""
+    drop, ponytail = map(load_scene, ('drop', 'ponytail'))
+    urdf = checksum(scene_to_urdf(drop, 'world'))
+    assert urdf == checksum(scene_to_urdf(ponytail, 'world'))
+    frames = NodeFrames(peer, 'told', NodeHands(peer, 'told'))
+    frames.subscribe(OPEN)
+    publishers = [peer.create_publisher(kind, topic, LATCHED_HISTORY) for kind, topic in (
+        (DiagnosticArray, 'told/measures'), (PoseArray, 'told/poses'))]
+    for publisher in publishers:
+        peer.wait(publisher.get_subscription_count)
+
+    def tick(scene, time):
+        publishers[0].publish(serialize_measures('/ragdoll', time, TickMeasures(
+            time, 1 + (scene is ponytail), urdf, checksum(run_scene_text(scene)), 0.0, 0.0, 0.0)))
+        publishers[1].publish(serialize_message(to_pose_array('world', time, np.ones((10, 7)))))
+
+    def use(scene):
+        frames.set_scene(ObservedPushes(scene), checksum(run_scene_text(scene)))
+
+    use(drop)
+    got = []
+    wait(lambda: tick(drop, 1) or got.extend(frames.take()) or got)
+    assert {frame.scene.name for frame in got} == {'drop'}
+    last = frames.last_poses
+    tick(ponytail, 2)
+    wait(lambda: got.extend(frames.take()) or frames.last_poses != last)
+    assert {frame.scene.name for frame in got} == {'drop'}
+    use(ponytail)
+    wait(lambda: frames.newest.scene.name == 'ponytail')
 
 
 @pytest.mark.parametrize('name', ['drop', 'crowd', 'article', 'flight', 'ponytail'])
 def test_shapes_and_axes_from_a_urdf_are_the_scenes(name):
     """The bones' frames are those of the poses: half extents along the same axes."""
     scene = load_scene(name)
-    found, note = scene_of_node('/not/here.yaml', scene.bone_names, scene_to_urdf(scene, 'map'))
-    same, nothing = scene_of_node(name, scene.bone_names, scene_to_urdf(scene, 'map'), 'map')
+    found, note = scene_of_node('/not/here.yaml', 'no text of a scene', scene.bone_names,
+                                scene_to_urdf(scene, 'map'))
+    same, nothing = scene_of_node(name, run_scene_text(scene), (), '')
     assert same == scene and not nothing
     assert note and found.bone_names == scene.bone_names
     for ours, theirs in zip(found.bones, scene.bones, strict=True):
@@ -466,7 +523,7 @@ def test_the_page_draws_the_node(node, page):
     wait(lambda: page.frame.time > before + 0.1)
     page.source.pause(True)
     wait(lambda: page.source.status.paused and page.frame is page.source.frame)
-    assert drawn(page, load_scene('drop'))
+    wait(lambda: drawn(page, load_scene('drop')))
 
 
 def test_an_open_page_follows_the_scene_that_others_set(node, page, peer, broken_scene, tmp_path):

@@ -327,9 +327,10 @@ class RagdollNode(Node):
 
     def _prepare_scene(self, scene: Scene, settings: NodeSettings) -> PreparedScene:
         """What all parts of the node need for a scene; this may run beside the ticks."""
+        run_scene = self._event_log.prepare(scene)
         return PreparedScene(
-            self._event_log.prepare(scene),
-            self._outputs.prepare(scene, settings.frame_id, settings.publish_tf),
+            run_scene,
+            self._outputs.prepare(scene, settings.frame_id, settings.publish_tf, run_scene.text),
             self.interactive.prepare(scene, settings.frame_id))
 
     def _set_simulation(self, simulation: Simulation,

@@ -40,7 +40,8 @@ class PreparedOutputs(NamedTuple):
 
     description: str
     """Of robot_description."""
-    checksum: str
+    checksums: tuple[str, str]
+    """Of that, and of the text on ~/scene."""
     templates: SceneTemplates
     tf: TfTemplate | None
     humans: list[Body]
@@ -73,14 +74,16 @@ class Outputs:
         self.humans = Humans(node)
         self._clock: Publisher | None = None
 
-    def prepare(self, scene: Scene, frame: str, publish_tf: str) -> PreparedOutputs:
-        """What set_scene() takes; this may run beside the ticks."""
+    def prepare(self, scene: Scene, frame: str, publish_tf: str,
+                text: str = '') -> PreparedOutputs:
+        """What set_scene() takes; ``text``: on ~/scene. This may run beside the ticks."""
         self._urdf_trees.keep(placement.doll for placement in scene.dolls)
         description = scene_to_urdf(scene, frame, self._urdf_trees)
         templates = SceneTemplates(scene, frame)
         if self._templates is not None:
             templates.make_as(self._templates)
-        return PreparedOutputs(description, checksum(description), templates,
+        checksums = checksum(description), text and checksum(text)
+        return PreparedOutputs(description, checksums, templates,
                                self._tf.prepare(scene, frame, publish_tf),
                                self.humans.prepare(scene))
 
@@ -95,7 +98,7 @@ class Outputs:
         """What has not published the last tick, for want of subscribers."""
         self._tf.set_scene(scene, frame, publish_tf, prepared.tf)
         self.humans.set_scene(prepared.humans, frame, publish_tf)
-        self._urdf = prepared.checksum
+        self._checksums = prepared.checksums
         self._description.publish(String(data=prepared.description))
 
     def keep_joints_from(self, moved_by: Mapping[str, Sequence[str]]) -> None:
@@ -199,7 +202,7 @@ class Outputs:
         if state is not self._energies[0]:  # dolls that sleep keep theirs
             self._energies = state, simulation.energy_excess, *simulation.work
         self._measures.publish(serialize_measures(self._name, stamp, TickMeasures(
-            simulation.time, run, self._urdf, *self._energies[1:])))
+            simulation.time, run, *self._checksums, *self._energies[1:])))
 
     def _publish_swings(self, simulation: Simulation, stamp: int) -> None:
         self._swings.publish(self._templates.swings.serialize(stamp, poses_of(simulation.swings)))

@@ -15,7 +15,8 @@ from ...model.scene import SECOND
 
 CDR_HEADER = b'\0\1\0\0'
 
-TIME, RUN, URDF, EXCESS = 'simulated_time', 'run', 'urdf_crc32', 'energy_excess_J'
+RUN, URDF, SCENE = 'run', 'urdf_crc32', 'scene_crc32'
+TIME, EXCESS = 'simulated_time', 'energy_excess_J'
 WORK_OF_PUSHES, WORK_OF_GRABS = 'work_of_pushes_J', 'work_of_grabs_J'
 
 
@@ -28,24 +29,26 @@ class TickMeasures(NamedTuple):
     """Number of the run, another one after each reset, change of scene and start of a node."""
     urdf: str
     """Checksum of the scene's URDF; see `checksum`."""
+    scene: str
+    """Checksum of the text on ~/scene; empty where that is not published."""
     energy_excess: float
     """Energy of all dolls, J, minus that at the start and all work."""
     work_of_pushes: float
     work_of_grabs: float
 
 
-def checksum(description: str) -> str:
-    """CRC-32 of a URDF as eight hexadecimal digits: tells which scene a message belongs to."""
-    return f'{zlib.crc32(description.encode()):08x}'
+def checksum(text: str) -> str:
+    """CRC-32 of a text as eight hexadecimal digits: tells which scene a message belongs to."""
+    return f'{zlib.crc32(text.encode()):08x}'
 
 
 def serialize_measures(name: str, stamp: int, measures: TickMeasures) -> bytes:
     """Serialized DiagnosticArray with one status of this ``name``; ``stamp`` in ns."""
     seconds, rest = divmod(measures.time, SECOND)
-    texts = (f'{seconds}.{rest:09}', str(measures.run), measures.urdf,
-             f'{measures.energy_excess:.9g}', f'{measures.work_of_pushes:.9g}',
-             f'{measures.work_of_grabs:.9g}')
-    return b''.join((CDR_HEADER, struct.pack('<iI', *divmod(stamp, SECOND)), _status(name),
+    texts = (f'{seconds}.{rest:09}', f'{measures.energy_excess:.9g}',
+             f'{measures.work_of_pushes:.9g}', f'{measures.work_of_grabs:.9g}')
+    return b''.join((CDR_HEADER, struct.pack('<iI', *divmod(stamp, SECOND)),
+                     _status(name, measures.run, measures.urdf, measures.scene),
                      *(key + _padded(text) for key, text in zip(_KEYS, texts, strict=True))))
 
 
@@ -55,14 +58,19 @@ def _padded(text: str) -> bytes:
     return struct.pack('<I', len(content) + 1) + content + bytes(4 - len(content) % 4)
 
 
-_KEYS = tuple(map(_padded, (TIME, RUN, URDF, EXCESS, WORK_OF_PUSHES, WORK_OF_GRABS)))
+_KEYS = tuple(map(_padded, (TIME, EXCESS, WORK_OF_PUSHES, WORK_OF_GRABS)))
+"""Of what changes from tick to tick."""
 
 
 @lru_cache(1)
-def _status(name: str) -> bytes:
-    """All between stamp and values: the frame, one status of level 0, the number of values."""
+def _status(name: str, run: int, urdf: str, scene: str) -> bytes:
+    """All between the stamp and what changes from tick to tick: the frame, one status of level 0,
+    the number of values, and those of the run.
+    """
+    constant = {RUN: str(run), URDF: urdf, SCENE: scene}
     return b''.join((_padded(''), struct.pack('<IB3x', 1, 0), _padded(name), _padded(''),
-                     _padded(''), struct.pack('<I', len(_KEYS))))
+                     _padded(''), struct.pack('<I', len(constant) + len(_KEYS)),
+                     *(_padded(text) for pair in constant.items() for text in pair)))
 
 
 def deserialize_measures(data: bytes) -> tuple[int, TickMeasures]:
@@ -85,7 +93,7 @@ def deserialize_measures(data: bytes) -> tuple[int, TickMeasures]:
         values = dict(zip(texts[::2], texts[1::2], strict=True))
         whole, _, part = values[TIME].partition('.')
         return seconds * SECOND + nanoseconds, TickMeasures(
-            int(whole) * SECOND + int(part), int(values[RUN]), values[URDF],
+            int(whole) * SECOND + int(part), int(values[RUN]), values[URDF], values[SCENE],
             float(values[EXCESS]), float(values[WORK_OF_PUSHES]), float(values[WORK_OF_GRABS]))
     except (struct.error, IndexError, KeyError) as error:
         raise ValueError(str(error)) from None

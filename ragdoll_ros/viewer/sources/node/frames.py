@@ -104,8 +104,8 @@ class NodeFrames:
         self._impacts = RecentImpacts()
         self._new_impacts: list[ImpactArrow] = []
         """Since the newest frame: the node publishes them after the poses of their tick."""
-        self._urdf = ''
-        """Checksum of the scene's URDF."""
+        self._checksum = ''
+        """Of the scene's text."""
         self._frames: deque[Frame] = deque(maxlen=MAX_MESSAGES)
         """Not taken yet."""
         self._frame: Frame | None = None
@@ -139,12 +139,10 @@ class NodeFrames:
             for kind in kinds - self._topics.keys():
                 self._topics[kind] = _NewMessages(self._node, TOPICS[kind], self._name)
 
-    def set_scene(self, pushes: ObservedPushes, urdf: str) -> None:
-        """Use the scene of these pushes for the poses of its URDF, of which ``urdf`` is the
-        checksum.
-        """
+    def set_scene(self, pushes: ObservedPushes, checksum: str) -> None:
+        """Use the scene of these pushes for its poses; ``checksum``: of its text on ~/scene."""
         with self._lock:
-            self._urdf = urdf
+            self._checksum = checksum
             if self._pushes is pushes:
                 return
             self._pushes, self._rods = pushes, Rods(pushes.scene)
@@ -186,7 +184,7 @@ class NodeFrames:
                 if self._is_new(measures):
                     self._add_frame(measures, poses)
         changed = self._is_outdated or self._moves != self._hands.moves
-        if changed and self._last is not None and self._last[0].urdf == self._urdf:
+        if changed and self._last is not None and self._last[0].scene == self._checksum:
             self._add_frame(*self._last)
 
     def _keep(self, kind: str, stamp: int, value: object) -> None:
@@ -208,7 +206,7 @@ class NodeFrames:
     def _complete_poses(self) -> Iterator[tuple[int, TickMeasures, np.ndarray]]:
         """Stamp, measures and poses of the scene; those before are of another, or incomplete."""
         known = {stamp: measures for stamp, measures in self._values.get('measures', {}).items()
-                 if measures.urdf == self._urdf}
+                 if measures.scene == self._checksum}
         last = max((k for k, (stamp, _) in enumerate(self._poses) if stamp in known), default=-1)
         for _ in range(last + 1):
             stamp, poses = self._poses.popleft()

@@ -216,13 +216,14 @@ class NodeSource(Source):
             self._opened = time.monotonic()
             create = self._node.create_subscription
             self._subscriptions = [
+                create(String, f'{NAME}/scene', self._scene.take_text, LATCHED),
                 create(String, 'robot_description', self._scene.take_description, LATCHED),
                 create(DiagnosticArray, '/diagnostics', self._take_diagnostics, 10),
                 create(ParameterEvent, '/parameter_events', self._scene.take_event, 10)]
         elif not requested.frames:
             self._end(self._subscriptions)
             self._subscriptions = []
-            self._scene.forget_description()
+            self._scene.forget()
         self._update_inputs(requested.frames and self._pushes is not None)
         self._frames.subscribe(requested)
 
@@ -276,5 +277,5 @@ class NodeSource(Source):
         if self._pushes is None or self._pushes.scene != self._scene.scene:
             self._hands.clear()
             self._pushes = ObservedPushes(self._scene.scene)
-        self._frames.set_scene(self._pushes, self._scene.urdf)
+        self._frames.set_scene(self._pushes, self._scene.checksum)
         self._update_subscriptions()
