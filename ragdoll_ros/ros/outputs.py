@@ -20,7 +20,13 @@ from ..model.scene import Scene
 from ..model.state import State
 from .humans.body import Body
 from .humans.publishers import Humans
-from .latched_topic import LATCHED, LATCHED_HISTORY, LatchedTopic, overridable_publisher
+from .latched_topic import (
+    LATCHED,
+    LATCHED_HISTORY,
+    LatchedTopic,
+    has_subscribers,
+    overridable_publisher,
+)
 from .messages.contact_wrenches import to_contact_wrenches
 from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
 from .messages.measures import TickMeasures, checksum, serialize_measures
@@ -133,12 +139,11 @@ class Outputs:
                        for topic in (self._measures, self._poses, self._swings))
                 or self._tf.has_subscribers or self.humans.has_subscribers
                 or self._joints_wanted or any(
-                    topic.get_subscription_count()
-                    for topic in (self._state, self._contacts, self._wrenches)))
+                    map(has_subscribers, (self._state, self._contacts, self._wrenches))))
 
     @property
     def _joints_wanted(self) -> bool:
-        return not self._joints_move and self._joints.get_subscription_count() > 0
+        return not self._joints_move and has_subscribers(self._joints)
 
     def publish(self, simulation: Simulation, stamp: int, now: int, paused: bool = False) -> None:
         """Publish the simulation's state with ``stamp``, ns, on topics with subscribers, markers at
@@ -152,16 +157,16 @@ class Outputs:
         self._tf.publish(simulation, stamp)
         self.humans.publish(simulation, stamp)
         templates = self._templates
-        if self._state.get_subscription_count():
+        if has_subscribers(self._state):
             state = simulation.state
             self._state.publish(templates.state.serialize(stamp, poses_of(state), twists_of(state)))
         if self._joints_wanted:
             self._joints.publish(templates.joints.serialize(
                 stamp, simulation.joint_angles, simulation.joint_rates))
-        if self._contacts.get_subscription_count():
+        if has_subscribers(self._contacts):
             self._contacts.publish(serialize_pose_array(self._frame, stamp,
                                                         contact_poses(simulation.contacts)))
-        if self._wrenches.get_subscription_count():
+        if has_subscribers(self._wrenches):
             self._wrenches.publish(to_contact_wrenches(self._frame, simulation.scene, stamp,
                                                        simulation.contacts))
         if not (paused or self._markers.has_subscribers):

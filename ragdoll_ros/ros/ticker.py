@@ -49,7 +49,7 @@ class PollThrottle:
 
     def __init__(self, interval: int) -> None:
         self._interval = interval
-        self._wakes_left = 2
+        self.wakes = self._wakes_left = 2
         self._next = 0
 
     @property
@@ -61,22 +61,25 @@ class PollThrottle:
         """Count a wake-up of the timer at ``now``, ns of the steady clock."""
         self._wakes_left = max(0, self._wakes_left - 1)
         if not self._wakes_left and now >= self._next:
-            self._wakes_left, self._next = 2, now + self._interval
+            self._wakes_left, self._next = self.wakes, now + self._interval
 
 
 class Ticker:
     """A timer on the ``steady`` clock that calls ``tick(due)`` each period, from start() to stop().
 
-    ``due`` is the steady time, ns, at which the tick was due.
+    ``due`` is the steady time, ns, at which the tick was due. An executor may drive() it instead.
     """
 
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
-        self._pacer, self._running = Pacer(1.0, 0), False
+        self._pacer = Pacer(1.0, 0)
+        self.running = False
+        """Whether there are ticks, from start() to stop()."""
         self._ticks_per_wake = 1
         self._throttles = {interval: PollThrottle(interval)
                            for interval in (SERVICE_INTERVAL, QOS_EVENT_INTERVAL)}
         self._timer = node.create_timer(1.0, self.run, clock=steady)
+        self._is_timed = True
 
     @property
     def dropped_time(self) -> float:
@@ -90,7 +93,7 @@ class Ticker:
 
     def polls(self, interval: int) -> bool:
         """Whether to poll entities of this ``interval``, one of those above; true while stopped."""
-        return not self._running or self._throttles[interval].is_open
+        return not self.running or self._throttles[interval].is_open
 
     @property
     def polls_any(self) -> bool:
@@ -103,13 +106,20 @@ class Ticker:
         later = (self._ticks_per_wake - 1) * self._pacer.period
         return self._pacer.wait(time.monotonic_ns()) + later
 
+    def drive(self) -> None:
+        """Leave it to the caller to call run(), which polls where it is to after each."""
+        self._is_timed = False
+        self._timer.cancel()
+        for throttle in self._throttles.values():
+            throttle.wakes = 1
+
     def start(self, period: float) -> None:
         """Start or restart; the first tick is due one ``period``, ns, from now."""
         self._pacer.period = period
         self._pacer.start(time.monotonic_ns())
         self._set_ticks_per_wake(1)
-        self._timer.reset()
-        self._running = True
+        self._reset_timer()
+        self.running = True
 
     def set_idle(self, idle: bool) -> None:
         """While idle, all dolls asleep without a subscriber, wake every second tick and make two:
@@ -122,7 +132,7 @@ class Ticker:
     def stop(self) -> None:
         """Stop ticking."""
         self._timer.cancel()
-        self._running = False
+        self.running = False
 
     def run_beside(self, make: Callable[[], Result]) -> Result:
         """Return what ``make`` returns, or raise what it raises. It runs in a thread; meanwhile the
@@ -147,7 +157,7 @@ class Ticker:
             pause = MIN_TIMER_PERIOD / 1e9
             while not done.wait(pause):
                 begin = time.monotonic()
-                if self._running:
+                if self.running:
                     self.run()
                 # As long as the ticks took: on a busy machine they would leave nothing to it.
                 pause = max(MIN_TIMER_PERIOD / 1e9, time.monotonic() - begin)
@@ -156,6 +166,10 @@ class Ticker:
         if failures:
             raise failures[0]
         return results[0]
+
+    def _reset_timer(self) -> None:
+        if self._is_timed:
+            self._timer.reset()
 
     def _set_ticks_per_wake(self, ticks: int) -> None:
         self._ticks_per_wake, period = ticks, self._pacer.period
@@ -179,4 +193,4 @@ class Ticker:
         if self._pacer.dropped_time != dropped:
             # Ticks are due in another phase now. The timer would come up to half a period before
             # them, and stamps would lie in the future.
-            self._timer.reset()
+            self._reset_timer()

@@ -65,18 +65,19 @@ def run_script(client: viser.ClientHandle, source: str) -> None:
     client._websock_connection.queue_message(_messages.RunJavascriptMessage(source))
 
 
-def set_poses(handle: viser.BatchedMeshHandle, positions: np.ndarray, wxyzs: np.ndarray) -> None:
+def set_poses(handle: viser.BatchedMeshHandle, **arrays: np.ndarray) -> None:
     """Set the poses of a batch's p parts in one message, or none where nothing has changed.
 
-    ``positions`` (p, 3) m and ``wxyzs`` (p, 4), float32, are kept: do not write to them later. The
-    attributes of the handle send a message each and copy each array three times.
+    ``batched_positions`` (p, 3) m and ``batched_wxyzs`` (p, 4), float32, are kept: do not write to
+    them later. The attributes of the handle send a message each and copy each array three times.
     """
     props = handle._impl.props
-    if not (np.array_equal(props.batched_positions, positions)
-            and np.array_equal(props.batched_wxyzs, wxyzs)):
-        props.batched_positions, props.batched_wxyzs = positions, wxyzs
-        handle._impl.api._queue_scene_message(_messages.SceneNodeUpdateMessage(
-            handle.name, {'batched_positions': positions, 'batched_wxyzs': wxyzs}))
+    changed = {name: array for name, array in arrays.items()
+               if not np.array_equal(getattr(props, name), array)}
+    if changed:
+        vars(props).update(changed)
+        handle._impl.api._queue_scene_message(
+            _messages.SceneNodeUpdateMessage(handle.name, changed))
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from visualization_msgs.msg import MarkerArray
 
 from ...files.limits import load_limits
 from ...model.errors import RagdollError
+from ..latched_topic import has_subscribers
 from .markers import to_impact_markers
 from .messages import to_impacts
 
@@ -54,8 +55,7 @@ class ImpactPublisher:
 
     def start(self, simulation: Simulation) -> None:
         """Before a tick: begin or end the recording as there are subscribers or none."""
-        if not (self._publisher.get_subscription_count()
-                or self._markers.get_subscription_count()):
+        if not (has_subscribers(self._publisher) or has_subscribers(self._markers)):
             if self._recorded is not None or self._refused is not None:
                 self.stop()
         elif simulation not in (self._recorded, self._refused):

@@ -52,10 +52,14 @@ def serialize_measures(name: str, stamp: int, measures: TickMeasures) -> bytes:
                      *(key + _padded(text) for key, text in zip(_KEYS, texts, strict=True))))
 
 
+_ENDS = tuple(bytes(4 - length % 4) for length in range(4))
+"""Zeros behind a string by its length modulo four."""
+
+
 def _padded(text: str) -> bytes:
     """A string up to the next multiple of four bytes, where it begins at one."""
     content = text.encode()
-    return struct.pack('<I', len(content) + 1) + content + bytes(4 - len(content) % 4)
+    return (len(content) + 1).to_bytes(4, 'little') + content + _ENDS[len(content) % 4]
 
 
 _KEYS = tuple(map(_padded, (TIME, EXCESS, WORK_OF_PUSHES, WORK_OF_GRABS)))

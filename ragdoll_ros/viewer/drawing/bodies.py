@@ -109,8 +109,12 @@ class Bodies:
 
     def show(self, state: State) -> None:
         """Draw a state."""
-        for batch in (*self.batches, *self._balls):
-            set_poses(batch.handle, *_part_poses(state, batch.bones, batch.local_pose))
+        for batch in self.batches:
+            positions, wxyzs = _part_poses(state, batch.bones, batch.local_pose)
+            set_poses(batch.handle, batched_positions=positions, batched_wxyzs=wxyzs)
+        for batch in self._balls:  # nobody sees whether they turn
+            positions, _ = _part_poses(state, batch.bones, batch.local_pose)
+            set_poses(batch.handle, batched_positions=positions)
 
     def set_visible(self, visible: bool, translucent: bool) -> None:
         """Show or hide the bones below skins; others stay visible."""

@@ -8,8 +8,8 @@ from ...model.scene import Scene
 from ...model.shapes import Part, Sphere
 
 MOST = 100
-"""Number of joints of a scene above which no balls are drawn: each costs the page as much as a bone
-when it moves, 1.7 kB/s, and in a crowd they are too small to be seen."""
+"""Number of joints of a scene above which no balls are drawn: each costs the page half as much as a
+bone when it moves, .7 kB/s, and in a crowd they are too small to be seen."""
 
 OVERLAP = 1.25
 """Radius of a ball relative to the gap between joint and bone that it bridges."""
