@@ -16,7 +16,9 @@ from ragdoll_ros.viewer.pushing.ball import (
     MASS,
     NAME,
     RADIUS,
+    RANGE,
     SPEED,
+    Target,
     aim,
     has_ball,
     launch,
@@ -60,7 +62,8 @@ def test_it_meets_what_it_was_thrown_at(target, velocity):
     scene = with_ball(load_scene('drop'))
     for distance in (1.0, 3.0, 9.0):
         eye = np.array(target) + distance * np.array((0.6, 0.0, 0.8))
-        position, speed = launch(scene, eye, np.array(target, float), np.array(velocity, float))
+        position, speed = launch(scene, eye, Target(np.array(target, float),
+                                                    np.array(velocity, float)))
         assert np.linalg.norm(np.array(position) - target) == pytest.approx(min(distance, 3.0))
         with Simulation(scene, step=min(distance, 3.0) / SPEED / 10) as simulation:
             simulation.set_state(NAME, position, velocity=speed)
@@ -83,13 +86,38 @@ def test_what_a_line_of_sight_meets():
         head = simulation.state.positions[scene.bone_index('doll/head')]
         simulation.set_state(NAME, head + np.array((1, 0, 0)))
         frame = Frame(scene, 0.0, simulation.state)
-        met, velocity = line(frame, head + np.array((4, 0, 0)), head)
-        assert np.abs(met - head).max() < 1e-9 and not velocity.any()
-        met, _ = line(frame, (5, 5, 2), (5, 7, 0))
-        assert met == pytest.approx((5, 7, 0))
+        met, velocity, falls = line(frame, head + np.array((4, 0, 0)), head)
+        assert np.abs(met - head).max() < 1e-9 and not velocity.any() and not falls
+        assert line(frame, (5, 5, 2), (5, 7, 0)).position == pytest.approx((5, 7, 0))
         eye = np.array((5.0, 0, 1))
-        met, _ = line(frame, eye, eye + np.array((0, 0, 1)))
+        met = line(frame, eye, eye + np.array((0, 0, 1))).position
         assert met == pytest.approx(eye + np.array((0, 0, 3)))
+
+
+@pytest.mark.parametrize('ticks', [3, 30, 200])
+@pytest.mark.parametrize('eye', [(4, 0, 1), (1, 5, 2), (0.8, 0, 0.5)])
+def test_it_hits_a_doll_that_falls_and_one_that_lies(ticks, eye):
+    """Thrown at its head just after the start, in free fall, and at rest: the doll is hit, by a
+    tenth of the ball's momentum at least, when the ball is to arrive. Without a lead of one in
+    free fall the ball passes above it.
+    """
+    high = dataclasses.replace(DROP.dolls[0], position=(0.0, 0.0, 3.0))
+    scene, motion = with_ball(dataclasses.replace(DROP, dolls=(high,))), Motion()
+    masses = np.array([bone.mass for bone in scene.bones[:-1]])
+    with Simulation(scene) as simulation:
+        for tick in range(ticks):
+            frame = Frame(scene, tick / 100, simulation.advance())
+            motion.add(frame)
+        falls, head = motion.falls(1), frame.state.positions[scene.bone_index('doll/head')]
+        assert falls == (ticks < 200)
+        target = aim(frame, motion, head + eye, -np.array(eye))
+        position, velocity = launch(scene, head + eye, target)
+        simulation.set_state(NAME, position, velocity=velocity)
+        momenta = [masses @ simulation.state.linear_velocities[:-1]]
+        for _ in range(int(100 * RANGE / SPEED) + 5):
+            momenta.append(masses @ simulation.advance().linear_velocities[:-1])
+    gained = np.diff(momenta, axis=0) - falls * masses.sum() * np.array(scene.gravity) / 100
+    assert np.linalg.norm(gained, axis=1).max() > 0.1 * MASS * SPEED
 
 
 @pytest.fixture

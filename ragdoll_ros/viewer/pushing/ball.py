@@ -4,6 +4,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -100,11 +101,13 @@ class BallThrower:
                                     f'The scene starts again with it.{flies}', auto_close_seconds=6)
 
     def update(self, frame: Frame, motion: Motion) -> None:
-        """Throw what waits; ``motion`` is that of the newest frame."""
-        if self._pending is not None and has_ball(frame.scene):
+        """Throw what waits, when it is known who falls; ``motion`` is that of the newest frame."""
+        if self._pending is None or not has_ball(frame.scene):
+            return
+        if motion.knows_falling or self._source.status.paused:
             (origin, direction), self._pending = self._pending, None
-            target, velocity = aim(frame, motion, origin, direction)
-            self._source.set_state(NAME, *launch(frame.scene, origin, target, velocity))
+            target = aim(frame, motion, origin, direction)
+            self._source.set_state(NAME, *launch(frame.scene, origin, target))
 
     def _add(self, client: viser.ClientHandle, scene: Scene) -> None:
         try:
@@ -133,10 +136,30 @@ def with_ball(scene: Scene) -> Scene:
     return dataclasses.replace(scene, dolls=(*scene.dolls, ball))
 
 
-def aim(frame: Frame, motion: Motion, origin: np.ndarray,
-        direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What a line of sight meets, (3,) m, and its velocity (3,) m/s, world frame: a bone, else the
-    ground, else the point at the distance of the first doll. The ball itself is looked through.
+class Target(NamedTuple):
+    """What a ball is thrown at, and how it moves; (3,), world frame."""
+
+    position: np.ndarray
+    """m."""
+    velocity: np.ndarray = np.zeros(3)
+    """m/s."""
+    falls: bool = False
+    """Whether gravity accelerates it; else nothing does."""
+
+    def at(self, time: float, scene: Scene) -> np.ndarray:
+        """Where it will be in ``time`` s, (3,) m: not below the ground."""
+        place = self.position + self.velocity * time
+        if self.falls:
+            place += np.array(scene.gravity) * time ** 2 / 2
+            if scene.ground is not None:
+                normal = np.array(scene.ground.normal)
+                place += normal * max(0.0, scene.ground.offset + RADIUS - place @ normal)
+        return place
+
+
+def aim(frame: Frame, motion: Motion, origin: np.ndarray, direction: np.ndarray) -> Target:
+    """What a line of sight meets: a bone, else the ground, else the point at the distance of the
+    first doll. The ball itself is looked through. ``origin`` (3,) m, ``direction`` (3,).
     """
     unit = direction / np.linalg.norm(direction)
     names = [placement.name for placement in frame.scene.dolls]
@@ -144,27 +167,29 @@ def aim(frame: Frame, motion: Motion, origin: np.ndarray,
     bone = bone_at(frame, origin, unit, ignored=ball)
     if bone is not None:
         depth = (frame.state.positions[bone] - origin) @ unit
-        velocity = motion.velocities()[bone] if motion.frame is frame else np.zeros(3)
-        return origin + depth * unit, velocity
+        place = origin + depth * unit
+        if motion.frame is not frame:
+            return Target(place)
+        return Target(place, motion.velocities()[bone], motion.falls(bone))
     ground = frame.scene.ground
     if ground is not None:
         normal = np.array(ground.normal)
         height, sinks = origin @ normal - ground.offset, -(unit @ normal)
         if height > 0 and sinks > 1e-6:
-            return origin + height / sinks * unit, np.zeros(3)
+            return Target(origin + height / sinks * unit)
     depth = (doll_mean(frame.scene, 0, frame.state.positions) - origin) @ unit
-    return origin + max(depth, RANGE) * unit, np.zeros(3)
+    return Target(origin + max(depth, RANGE) * unit)
 
 
-def launch(scene: Scene, origin: np.ndarray, target: np.ndarray, velocity: np.ndarray
-           ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Position (3,) m and velocity (3,) m/s with which a ball meets ``target`` (3,) m, which moves
-    with ``velocity`` (3,) m/s and does not fall: x = x0 + v t + g t^2 / 2, t = distance / SPEED.
+def launch(scene: Scene, origin: np.ndarray,
+           target: Target) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Position (3,) m and velocity (3,) m/s with which a ball meets ``target`` after the time t =
+    distance / SPEED: x = x0 + v t + g t^2 / 2. ``origin`` (3,) m: of the camera.
     """
-    way = target - origin
+    way = target.position - origin
     distance = max(float(np.linalg.norm(way)), 1e-6)
     length = min(distance, RANGE)
-    start = target - way * (length / distance)
+    start = target.position - way * (length / distance)
     time = max(length, RADIUS) / SPEED
-    speed = (target - start) / time + velocity - np.array(scene.gravity) * time / 2
+    speed = (target.at(time, scene) - start) / time - np.array(scene.gravity) * time / 2
     return tuple(start.tolist()), tuple(speed.tolist())
