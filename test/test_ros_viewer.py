@@ -199,6 +199,22 @@ def test_listens_to_what_is_shown_alone(node, remote, peer):
     peer.wait(lambda: listened() == [])
 
 
+def test_contacts_with_bodies_are_on_the_timeline(no_node, nodes, page, peer):
+    """On stairs, above the ground; in a scene without bodies nobody listens to contacts."""
+    pytest.importorskip('numba')
+    nodes.append(start('node', compiled=True))
+    wait(lambda: page.frame)
+    assert not peer.count_subscribers('ragdoll/contacts')
+    page.source.load('stairs')
+
+    def touched_above_ground():
+        clip = page.timeline.clip
+        return any(clip.frame(int(k)).state.positions[:, 2].min() > 0.3
+                   for k in np.flatnonzero(clip.touching))
+
+    wait(lambda: page.frame.scene.name == 'stairs' and touched_above_ground())
+
+
 def test_impacts_are_seen_for_a_second(no_node, nodes, remote, peer):
     pytest.importorskip('numba')
     nodes.append(start('node', compiled=True))

@@ -1,4 +1,4 @@
-"""The timeline: what was shown is kept for a minute, looked at again, saved, and costs no tick."""
+"""The timeline: what was shown is kept for minutes, looked at again, saved, and costs no tick."""
 from __future__ import annotations
 
 import io
@@ -6,6 +6,7 @@ import threading
 import time
 import tracemalloc
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,13 +20,16 @@ from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.save import FORMATS
+from ragdoll_ros.viewer.command import free_port, server_at
 from ragdoll_ros.viewer.sources.playback import PlaybackSource
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 from ragdoll_ros.viewer.sources.source import Frame
-from ragdoll_ros.viewer.timeline.export import export_zip
-from ragdoll_ros.viewer.timeline.frame_buffer import MAX_NUMBERS, SPAN, FrameBuffer
+from ragdoll_ros.viewer.timeline import frame_buffer
+from ragdoll_ros.viewer.timeline.export import ALL, PART, ExportPanel, export_zip
+from ragdoll_ros.viewer.timeline.frame_buffer import MAX_FRAMES, MAX_NUMBERS, FrameBuffer
 from ragdoll_ros.viewer.timeline.playhead import Playhead
 from ragdoll_ros.viewer.timeline.strip import WIDTH, strip
+from ragdoll_ros.viewer.timeline.timeline import Timeline
 from ragdoll_ros.viewer.timeline.transport import PERIOD
 
 DROP = load_scene('drop')
@@ -51,19 +55,22 @@ def buffer():
     return buffer
 
 
-def test_a_minute_is_kept_and_no_more():
-    """Of 90 s in frames at even times those of the last 60 s, the newest being the last."""
-    buffer = FrameBuffer()
-    for tick in range(901):
-        buffer.add(frame(tick / 10))
+def test_five_minutes_of_a_doll_are_kept_and_no_more():
+    """Of 310 s in ticks of 10 ms those of the last 300 s, each in its place, the newest last."""
+    buffer, seen = FrameBuffer(), frame(0.0)
+    for tick in range(31_000):
+        assert buffer.clip().is_cut == (tick > MAX_FRAMES) if tick % 5000 == 1 else True
+        buffer.add(replace(seen, time=tick / 100, grabs=(None,) if tick % 7 == 0 else ()))
     clip = buffer.clip()
-    assert len(buffer) == 601 and clip.duration == pytest.approx(SPAN)
-    assert clip.frame(600).time == 90.0 and clip.frame(0).time == 30.0
+    assert len(buffer) == MAX_FRAMES and clip.duration == pytest.approx(299.99) and clip.is_cut
+    assert clip.frame(0).time == 10.0 and clip.frame(MAX_FRAMES - 1).time == 309.99
+    np.testing.assert_allclose(clip.times, [clip.frame(k).time for k in range(MAX_FRAMES)])
+    assert (clip.pushed == [bool(clip.frame(k).grabs) for k in range(MAX_FRAMES)]).all()
 
 
-@pytest.mark.parametrize('minutes', [3, pytest.param(30, marks=pytest.mark.slow)])
+@pytest.mark.parametrize('minutes', [12, pytest.param(90, marks=pytest.mark.slow)])
 def test_memory_is_bounded_whatever_comes(minutes):
-    """So many minutes at 60 frames a second, without waiting: no more than after the first.
+    """So many minutes at 60 frames a second, without waiting: no more than when it was full.
 
     A frame of ten bones is 1040 bytes of numbers and half as much of objects.
     """
@@ -71,14 +78,14 @@ def test_memory_is_bounded_whatever_comes(minutes):
     buffer, sizes = FrameBuffer(), []
     for tick in range(minutes * 3600):
         buffer.add(frame(tick / 60))
-        if tick in (3700, minutes * 3600 - 1):
+        if tick in (MAX_FRAMES + 100, minutes * 3600 - 1):
             sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
-    # It goes up and down by 2 %; one number kept of each frame would be 35 % in 30 minutes.
-    assert sizes[1] < 1.05 * sizes[0] and sizes[1] < 15e6
+    # It goes up and down by 2 %; one number kept of each frame would be 20 % in 90 minutes.
+    assert sizes[1] < 1.05 * sizes[0] and sizes[1] < 60e6
 
 
-def test_a_crowd_is_kept_for_less_than_a_minute():
+def test_a_crowd_is_kept_for_less_time():
     """By the numbers that its frames hold."""
     buffer, crowd = FrameBuffer(), load_scene('crowd')
     numbers = 13 * len(crowd.bones)
@@ -92,9 +99,8 @@ def test_a_crowd_is_kept_for_less_than_a_minute():
 def test_the_timeline_goes_on_over_a_reset(buffer):
     """Time that goes back is a reset: a tick later; the same frame again is not kept."""
     assert buffer.add(frame(1.0)) is None
-    entry = buffer.add(frame(0.0))
-    assert entry.resets and entry.time == pytest.approx(1.01)
-    buffer.add(frame(0.01))
+    assert buffer.add(frame(0.0)) is True and buffer.end == pytest.approx(1.01)
+    assert buffer.add(frame(0.01)) is False
     clip = buffer.clip()
     assert np.flatnonzero(clip.resets).tolist() == [101]
     np.testing.assert_allclose(np.diff(clip.times), 0.01, atol=1e-12)
@@ -116,6 +122,62 @@ def test_pushes_and_contacts_are_marked(buffer):
     quiet = FrameBuffer()
     quiet.add(frame(0.0))
     assert '#e63219' not in strip(quiet.clip())
+
+
+def test_contacts_with_bodies_and_other_dolls_are_marked():
+    """Where a source tells of them: also on stairs. Those of two bones of one doll are none."""
+    stairs, buffer = load_scene('stairs'), FrameBuffer()
+    with Simulation(stairs) as simulation:
+        for tick in range(150):
+            contacts = simulation.contacts
+            pairs = np.stack([contacts.a, contacts.b, contacts.bodies], axis=1)
+            buffer.add(Frame(stairs, tick / 100, simulation.state, contacts=contacts.positions,
+                             pairs=pairs))
+            if tick == 0:
+                assert not buffer.clip().touching[0]
+            last = simulation.advance()
+    assert buffer.clip().touching[-1] and len(contacts) and last.positions[:, 2].min() > 0.2
+    assert (pairs[:, 2] >= 0).any()
+    own = FrameBuffer()
+    own.add(frame(0.0, contacts=np.zeros((1, 3)), pairs=np.array([[0, 1, -1]])))
+    own.add(frame(0.01, contacts=np.zeros((1, 3)), pairs=np.array([[0, -1, 2]])))
+    assert own.clip().touching.tolist() == [False, True]
+
+
+@pytest.fixture
+def runs():
+    """Three runs of 0.5, 0.3 and 0.4 s."""
+    buffer = FrameBuffer()
+    for run, ticks in ((0, 51), (1, 31), (2, 41)):
+        for tick in range(ticks):
+            buffer.add(frame(tick / 100, run=run))
+    return buffer.clip()
+
+
+def test_a_run_and_a_part_are_cut_out(runs):
+    assert [runs.run(k) for k in (0, 50, 51, 81, 82, 122)] == [
+        range(51), range(51), range(51, 82), range(51, 82), range(82, 123), range(82, 123)]
+    part = runs.part(runs.run(60)[5:9])
+    assert [part.frame(k).time for k in range(4)] == [0.05, 0.06, 0.07, 0.08]
+    assert {part.frame(k).run for k in range(4)} == {1} and len(part.recording()) == 4
+
+
+def test_what_is_exported_is_the_last_run_unless_one_chooses(runs):
+    """Its times, as the bar shows them, from and to; a part that is not kept is an error."""
+    with server_at('127.0.0.1', free_port('127.0.0.1', 0)) as server:
+        panel = ExportPanel(server.gui, lambda: runs)
+        times = lambda: [panel.chosen().frame(k).time  # noqa: E731
+                         for k in range(len(panel.chosen().times))]
+        assert times() == [tick / 100 for tick in range(41)] and not panel.first.visible
+        panel.choice.value = PART
+        wait(lambda: panel.last.visible and panel.last.value == 0.4)
+        panel.first.value, panel.last.value = 0.1, 0.25
+        assert times() == [tick / 100 for tick in range(10, 26)]
+        panel.first.value = 0.3
+        with pytest.raises(ValueError, match=r'from 0.3 to 0.25 s: .* from 0 to 0.4 s'):
+            panel.chosen()
+        panel.choice.value = ALL
+        assert len(panel.chosen().times) == len(runs.times)
 
 
 def test_a_playhead_pauses_plays_and_steps(buffer):
@@ -278,8 +340,27 @@ def test_a_typed_time_is_that_of_the_shown_run():
             client.steer(page, f'time {text}')
             wait(lambda instant=instant: page.frame.time == pytest.approx(instant, abs=1e-9))
             assert page.frame.run == run and not page.timeline.is_live
+        assert page.timeline.go_to_time(0.25) == ''
+        assert page.timeline.go_to_time(-1.0).startswith('kept: 0.00 to ')
         client.steer(page, 'time 99')
         wait(lambda: page.frame is page.timeline.clip.frame(len(page.timeline.clip.times) - 1))
+
+
+def test_a_typed_time_that_is_not_kept_says_why(monkeypatch):
+    """What was before has made room, or the page was opened later, or it has not come yet."""
+    monkeypatch.setattr(frame_buffer, 'MAX_FRAMES', 50)
+    source = SimulationSource(DROP)
+    timeline = Timeline(source)
+    for tick in range(10, 50):
+        timeline.add(frame(tick / 100))
+    assert timeline.go_to_time(0.3) == ''
+    assert timeline.go_to_time(0.0) == 'kept: 0.10 to 0.49 s; the page was opened then'
+    assert timeline.go_to_time(0.5) == 'kept: 0.10 to 0.49 s'
+    timeline.go_live()
+    for tick in range(50, 80):
+        timeline.add(frame(tick / 100))
+    assert timeline.go_to_time(0.29).startswith('kept: 0.30 to 0.79 s; what is older made room')
+    source.close()
 
 
 def test_plots_follow_the_timeline():

@@ -135,7 +135,7 @@ class Page:
         """Draw what has changed; returns whether any page is open."""
         clients = list(self.server.get_clients().values())
         is_open = bool(clients)
-        self.source.request(self.display.requested if is_open else RequestedData())
+        self.source.request(self._requested if is_open else RequestedData())
         self.controls.pushes.update(time.monotonic())
         start = self.start_when_visible
         waits = start is not None and not start.is_done
@@ -146,6 +146,14 @@ class Page:
         if waits:
             start.update(clients, frame, time.monotonic())
         return is_open
+
+    @property
+    def _requested(self) -> RequestedData:
+        """What is drawn, and the contacts of scenes with bodies: the timeline marks them."""
+        scene = self._live and self._live.scene
+        has_bodies = scene is not None and bool(scene.bodies or scene.robots)
+        return replace(self.display.requested,
+                       contacts=has_bodies or self.display.contacts.value)
 
     def _update_pages(self, now: float) -> None:
         """Draw what has changed at ``now`` s of a steady clock."""

@@ -1,4 +1,4 @@
-"""Buttons that record the run, save the view, and export the timeline."""
+"""Buttons that record the run, save the view, and export what is on the timeline."""
 from __future__ import annotations
 
 import importlib.util
@@ -12,7 +12,7 @@ import viser
 from ..recordings.mcap_file import recording_bytes
 from ..recordings.recording import RecordedPose, Recorder
 from .sources.source import Frame
-from .timeline.export import export_zip
+from .timeline.export import ExportPanel
 from .timeline.frame_buffer import Clip
 
 MAX_NUMBERS = 5_000_000
@@ -29,14 +29,13 @@ SCENE_CHANGED, FULL = 'Download (scene has changed)', 'Download (recording is fu
 
 
 class RecordingPanel:
-    """Three buttons in the panel; `add` takes the frames and may be called from any thread.
+    """Three buttons in the panel, which export parts of the ``clip``; `add` takes the frames and
+    may be called from any thread.
 
     All pages share one recording; the page that stops it gets the file.
     """
 
     def __init__(self, server: viser.ViserServer, clip: Callable[[], Clip | None]) -> None:
-        self._clip = clip
-        """What is exported: the whole timeline."""
         self.recorder: Recorder | None = None
         """Frames recorded so far; None if there is no recording."""
         self._ended = False
@@ -48,12 +47,8 @@ class RecordingPanel:
                 if CAN_WRITE else 'Requires mcap: pip install mcap')
             screenshot = server.gui.add_button('Screenshot', icon=viser.Icon.CAMERA,
                                                hint='This view as ragdoll.png')
-            export = server.gui.add_button(
-                'Export: glTF, BVH, CSV, MCAP', icon=viser.Icon.DOWNLOAD,
-                hint='The whole timeline as run.zip, with times from its beginning; glTF for '
-                'Blender')
+            self.export = ExportPanel(server.gui, clip)
         self._frame: Frame | None = None
-        export.on_click(self._send_export)
         self.button.on_click(lambda event: self.toggle(event.client))
         screenshot.on_click(_send_screenshot)
 
@@ -96,13 +91,6 @@ class RecordingPanel:
         if recorder is not None and client is not None:
             content = recording_bytes(recorder.recording())
             client.send_file_download('run.mcap', content, save_immediately=True)
-
-    def _send_export(self, event: viser.GuiEvent) -> None:
-        """Send the whole timeline to the page that asked for it."""
-        clip = self._clip()
-        if clip is not None and event.client is not None:
-            event.client.send_file_download('run.zip', export_zip(clip.recording()),
-                                            save_immediately=True)
 
 
 def _send_screenshot(event: viser.GuiEvent) -> None:

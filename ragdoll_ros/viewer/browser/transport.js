@@ -23,11 +23,12 @@ function listen(send) {
         ${icon('M5 5v14l11-7zM16.5 5H19v14h-2.5z')}</button>
     </div>
     <label class="time"><input inputmode="decimal" autocomplete="off" aria-label="Time"
-      title="simulated time: type one to look back"> s</label>
+      title="simulated time: type one to look back"> s
+      <span class="note" role="status" hidden></span></label>
     <select aria-label="Speed" title="simulated time per wall time"></select>
     <i class="break"></i>
     <div class="track"><span></span><input type="range" min="0" step="0.001" aria-label="Timeline"
-      title="drag to look back: red, pushes; yellow, on the ground; grey, a reset"></div>
+      title="drag to look back: red, pushes; yellow, contacts; grey, a reset"></div>
     <span class="badge" hidden></span>
     <button class="live" data-do="live" title="Show the newest state (L)">Live</button>
     <span class="notice" role="status" hidden></span>`;
@@ -36,7 +37,7 @@ function listen(send) {
   const toggle = find('[data-do=toggle]'), step = find('[data-do=step]');
   const reset = find('[data-do=reset]'), time = find('.time input'), speed = find('select');
   const range = find('[type=range]'), strip = find('.track span'), live = find('.live');
-  const badge = find('.badge'), notice = find('.notice');
+  const badge = find('.badge'), notice = find('.notice'), note = find('.note');
   let byPointer = false, hiding = null, received = 0, last = '', loading = '', looks = 0;
 
   const put = (element, key, value) => { if (element[key] !== value) element[key] = value; };
@@ -90,6 +91,11 @@ function listen(send) {
     clearTimeout(hiding);
     hiding = setTimeout(() => { notice.hidden = true; }, 4000);
   };
+  window.ragdollTimeNote = (text) => {
+    note.textContent = text;
+    note.hidden = !text;
+    time.setAttribute('aria-invalid', !!text);
+  };
   if (window.ragdollTransport) window.ragdollShow(window.ragdollTransport);
   setInterval(() => {
     if (window.ragdollTransport?.speed !== undefined) showTime();
@@ -102,8 +108,11 @@ function listen(send) {
     if (button) send(button.dataset.do);
   });
   time.addEventListener('focus', () => { send('focus'); time.select(); });
-  time.addEventListener('blur', () => send('blur'));
-  time.addEventListener('input', () => { if (time.value.trim()) send(`time ${time.value}`); });
+  time.addEventListener('blur', () => { send('blur'); window.ragdollTimeNote(''); });
+  time.addEventListener('input', () => {
+    if (time.value.trim()) send(`time ${time.value}`);
+    else window.ragdollTimeNote('');
+  });
   range.addEventListener('input', () => send(`position ${range.value}`));
   speed.addEventListener('change', () => send(`speed ${speed.value}`));
   for (const element of [range, speed])

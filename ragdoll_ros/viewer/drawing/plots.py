@@ -19,7 +19,7 @@ SPAN = 20.0
 """s of the timeline that a plot shows."""
 
 MAX_POINTS = 30_000
-"""Kept: the timeline's 60 s in ticks of 2 ms."""
+"""Kept: as many as there are frames on the timeline."""
 
 COLUMNS = 150
 """Of a picture: in each, the smallest and the largest value are drawn."""

@@ -1,10 +1,10 @@
-"""Frames by their instants: those of the last minute, and those of a whole recording."""
+"""Frames by their instants: the last ones of a source, and those of a whole recording."""
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from operator import attrgetter
 
 import numpy as np
 
@@ -12,14 +12,11 @@ from ...physics.rigid_body import GroundHeights
 from ...recordings.recording import RecordedPose, Recorder, Recording
 from ..sources.source import Frame
 
-SPAN = 60.0
-"""s of simulated time that are kept."""
-
 MAX_FRAMES = 30_000
-"""SPAN in ticks of 2 ms."""
+"""Five minutes in ticks of 10 ms. Objects are half as large as the numbers of ten bones."""
 
 MAX_NUMBERS = 5_000_000
-"""40 MB: SPAN in ticks of 10 ms of six dolls of ten bones; less time of more dolls."""
+"""40 MB: MAX_FRAMES of a doll of ten bones, a minute of six; less time of more dolls."""
 
 TOUCH = 1e-3
 """m above the ground at which a bone counts as touching it, also while it bounces."""
@@ -27,20 +24,8 @@ TOUCH = 1e-3
 CONTACT_PERIOD = 0.05
 """s of simulated time between two tests for ground contact."""
 
-
-@dataclass(frozen=True)
-class TimelineFrame:
-    """A frame with its instant on the timeline, which continues over resets."""
-
-    time: float
-    """s since the first frame that was kept."""
-    frame: Frame
-    pushed: bool
-    """Whether a push or a hand acts."""
-    touching: bool
-    """Whether a bone touches the ground."""
-    resets: bool
-    """Whether it is the first frame after a reset."""
+COLUMNS = np.dtype([('time', float), ('pushed', bool), ('touching', bool), ('resets', bool)])
+"""What is kept beside each frame; see Clip."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +33,17 @@ class Clip:
     """A fixed sequence of frames at k ascending instants, s."""
 
     times: np.ndarray
+    """s since the first frame of the source; they continue over resets."""
     frame: Callable[[int], Frame]
     """Frame of an index."""
     pushed: np.ndarray
-    """(k,) bool, as in TimelineFrame; the next two as well."""
+    """(k,) bool: whether a push or a hand acts."""
     touching: np.ndarray
+    """(k,) bool: whether a bone touches the ground or anything else."""
     resets: np.ndarray
+    """(k,) bool: whether it is the first frame after a reset."""
+    is_cut: bool = False
+    """Whether there were frames before that have made room."""
 
     @property
     def duration(self) -> float:
@@ -66,6 +56,19 @@ class Clip:
         following = np.searchsorted(self.times - self.times[0], time + 5e-10, 'right')
         return max(int(following) - 1, 0)
 
+    def run(self, index: int) -> range:
+        """Indices of all frames of the run that a frame is of, from a reset to the next."""
+        starts = np.flatnonzero(self.resets)
+        following = int(np.searchsorted(starts, index, 'right'))
+        return range(int(starts[following - 1]) if following else 0,
+                     int(starts[following]) if following < len(starts) else len(self.times))
+
+    def part(self, indices: range) -> Clip:
+        """The frames of contiguous indices, of which there are some."""
+        part, first = slice(indices.start, indices.stop), indices.start
+        return Clip(self.times[part], lambda index: self.frame(first + index), self.pushed[part],
+                    self.touching[part], self.resets[part], self.is_cut or first > 0)
+
     def recording(self) -> Recording:
         """All frames as a recording."""
         recorder = Recorder(self.frame(0).scene)
@@ -77,12 +80,13 @@ class Clip:
 
 
 class FrameBuffer:
-    """Ring buffer of the last SPAN s of one scene; another scene clears it."""
+    """The last frames of one scene, up to MAX_FRAMES and MAX_NUMBERS; another scene clears it."""
 
     def __init__(self) -> None:
-        self._frames: deque[TimelineFrame] = deque()
-        self._heights: GroundHeights | None = None
-        self._last_contact_test = 0.0
+        self._frames: deque[Frame] = deque()
+        self._columns = np.empty(1024, COLUMNS)
+        """Rows of the frames end at ``_end``."""
+        self._clear()
 
     def __len__(self) -> int:
         return len(self._frames)
@@ -90,65 +94,98 @@ class FrameBuffer:
     @property
     def end(self) -> float:
         """Instant of the newest frame, s."""
-        return self._frames[-1].time if self._frames else 0.0
+        return float(self._rows['time'][-1]) if self._frames else 0.0
 
     @property
     def duration(self) -> float:
         """Time from the oldest frame to the newest, s."""
-        return self.end - self._frames[0].time if self._frames else 0.0
+        return self.end - float(self._rows['time'][0]) if self._frames else 0.0
 
-    def add(self, frame: Frame) -> TimelineFrame | None:
-        """Keep a frame, which must not be changed later; None if its instant is the last one's."""
+    def add(self, frame: Frame) -> bool | None:
+        """Keep a frame, which must not be changed later; whether it is the first after a reset.
+        None if its instant is the last one's.
+        """
         last = self._frames[-1] if self._frames else None
-        if last is not None and last.frame.scene is not frame.scene:
-            self._frames.clear()
+        if last is not None and last.scene is not frame.scene:
+            self._clear()
             last = None
-        time, was_touching, resets = 0.0, False, False
+        time, resets = 0.0, False
         if last is None:
-            self._heights, self._last_contact_test = GroundHeights(frame.scene), -np.inf
-        elif (frame.run, frame.time) == (last.frame.run, last.frame.time):
+            self._heights = GroundHeights(frame.scene)
+        elif (frame.run, frame.time) == (last.run, last.time):
             return None
         else:
-            was_touching = last.touching
-            resets = frame.run != last.frame.run or frame.time < last.frame.time
+            resets = frame.run != last.run or frame.time < last.time
             # A tick with a reset has no known length: it counts as long as the one before.
-            time = last.time + (self._last_step() if resets else frame.time - last.frame.time)
-        entry = TimelineFrame(time, frame, bool(frame.pushes or frame.grabs),
-                              self._touches(frame, time, was_touching), resets)
-        self._frames.append(entry)
+            time = self.end + (self._last_step() if resets else frame.time - last.time)
+        touches = self._touches_ground(frame, time) or has_contacts(frame)
+        self._append(frame, (time, bool(frame.pushes or frame.grabs), touches, resets))
         self._drop_old()
-        return entry
+        return resets
 
     def clip(self) -> Clip:
         """The frames that are kept now, at least one; later frames do not change the clip."""
-        frames = tuple(self._frames)
-        return Clip(_column(frames, 'time', float), lambda index: frames[index].frame,
-                    *(_column(frames, key, bool) for key in ('pushed', 'touching', 'resets')))
+        frames, rows = tuple(self._frames), self._rows.copy()
+        return Clip(rows['time'], frames.__getitem__, rows['pushed'], rows['touching'],
+                    rows['resets'], self._is_cut)
 
-    def _touches(self, frame: Frame, time: float, before: bool) -> bool:
+    @property
+    def _rows(self) -> np.ndarray:
+        """Of the frames that are kept."""
+        return self._columns[self._end - len(self._frames):self._end]
+
+    def _clear(self) -> None:
+        self._frames.clear()
+        self._end = self._numbers = 0
+        self._is_cut = self._on_ground = False
+        self._last_ground_test = -math.inf
+
+    def _append(self, frame: Frame, row: tuple[float, bool, bool, bool]) -> None:
+        if self._end == len(self._columns):
+            rows = self._rows
+            columns = np.empty(max(1024, 2 * len(rows)), COLUMNS)
+            columns[:len(rows)] = rows
+            self._columns, self._end = columns, len(rows)
+        self._columns[self._end] = row
+        self._end += 1
+        self._frames.append(frame)
+        self._numbers += _numbers(frame)
+
+    def _touches_ground(self, frame: Frame, time: float) -> bool:
         """Whether a bone touches the ground; tested at intervals, as it is slow for a crowd."""
-        if time < self._last_contact_test + CONTACT_PERIOD:
-            return before
-        self._last_contact_test = time
-        return bool(self._heights(frame.state).min() < TOUCH)
+        if time >= self._last_ground_test + CONTACT_PERIOD:
+            self._last_ground_test = time
+            self._on_ground = bool(self._heights(frame.state).min() < TOUCH)
+        return self._on_ground
 
     def _last_step(self) -> float:
-        last = self._frames[-1]
-        before = self._frames[-2] if len(self._frames) > 1 else None
-        return last.time - before.time if before is not None else last.frame.scene.step
+        times = self._rows['time'][-2:]
+        return float(times[1] - times[0]) if len(times) > 1 else self._frames[-1].scene.step
 
     def _drop_old(self) -> None:
-        """Drop frames that are too old or too many."""
+        """Drop the oldest frames while there are too many."""
         frames = self._frames
-        frame = frames[-1].frame
-        numbers = frame.state.rows.size + np.size(frame.rods)
-        limit = min(MAX_FRAMES, max(2, MAX_NUMBERS // numbers))
-        while len(frames) > limit or frames[-1].time - frames[0].time > SPAN:
-            frames.popleft()
+        while len(frames) > MAX_FRAMES or (self._numbers > MAX_NUMBERS and len(frames) > 2):
+            self._numbers -= _numbers(frames.popleft())
+            self._is_cut = True
 
 
-def _column(frames: tuple[TimelineFrame, ...], key: str, kind: type) -> np.ndarray:
-    return np.fromiter(map(attrgetter(key), frames), kind, len(frames))
+def has_contacts(frame: Frame) -> bool:
+    """Whether a source tells of contacts: with the ground, bodies or other dolls; also of bones of
+    one doll where it does not tell who touches whom.
+    """
+    if frame.contacts is None or frame.pairs is None:
+        return frame.contacts is not None and len(frame.contacts) > 0
+    dolls = frame.scene.doll_of_bone
+    first, second = frame.pairs[:, 0], frame.pairs[:, 1]
+    return bool(((second < 0) | (dolls[first] != dolls[second])).any())
+
+
+def _numbers(frame: Frame) -> int:
+    """Count of the numbers that a frame holds."""
+    return frame.state.rows.size + sum(
+        each.size for each in (frame.rods, frame.contacts, frame.forces, frame.pairs, frame.angles)
+        if each is not None)
 
 
 def clip_of(recording: Recording, frame_at: Callable[[float], Frame]) -> Clip:

@@ -1,4 +1,4 @@
-"""Event strip of the timeline: pushes, ground contact and resets over time."""
+"""Event strip of the timeline: pushes, contacts and resets over time."""
 from __future__ import annotations
 
 import numpy as np
@@ -15,7 +15,7 @@ TRACK = '<rect width="{width}" height="6" y="{top}" fill="#868e9633"/>'
 
 
 def strip(clip: Clip) -> str:
-    """SVG of WIDTH columns: pushes and hands above, ground contact below, resets as lines."""
+    """SVG of WIDTH columns: pushes and hands above, contacts below, resets as lines."""
     fraction = (clip.times - clip.times[0]) / max(clip.duration, 1e-9)
     columns = np.minimum((fraction * WIDTH).astype(int), WIDTH - 1)
     rows = [TRACK.format(width=WIDTH, top=top) for top in (0, 8)]
@@ -25,7 +25,7 @@ def strip(clip: Clip) -> str:
     rows += [f'<rect x="{column}" width="1" height="14" fill="{GREY}"/>'
              for column in np.unique(columns[clip.resets])]
     return (f'<svg viewBox="0 0 {WIDTH} 14" preserveAspectRatio="none" role="img" '
-            'aria-label="red: pushes and hands; yellow: on the ground; grey: a reset">'
+            'aria-label="red: pushes and hands; yellow: contacts; grey: a reset">'
             f'{"".join(rows)}</svg>')
 
 

@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from ..sources.source import Frame, Source
-from .frame_buffer import Clip, FrameBuffer, clip_of
+from .frame_buffer import MAX_FRAMES, Clip, FrameBuffer, clip_of
 from .playhead import Playhead
 
 
@@ -69,9 +69,9 @@ class Timeline:
         with self._lock:
             if self._recorded is not None:
                 return
-            entry = self._buffer.add(frame)
-            if self._playhead is not None and entry is not None and (
-                    entry.resets or frame.scene is not self._playhead.clip.frame(0).scene):
+            resets = self._buffer.add(frame)
+            if self._playhead is not None and (
+                    resets or frame.scene is not self._playhead.clip.frame(0).scene):
                 self._playhead = None
 
     def frame_to_show(self, live: Frame, now: float) -> Frame:
@@ -107,21 +107,22 @@ class Timeline:
             if playhead is not None:
                 playhead.go_to(position, time.monotonic())
 
-    def go_to_time(self, simulated: float) -> None:
-        """Show the frame of a simulated time, s, of the run that is shown."""
+    def go_to_time(self, simulated: float) -> str:
+        """Show the frame of a simulated time, s, of the run that is shown. If it is not kept, what
+        is, as text; else empty.
+        """
         with self._lock:
             playhead = self._start_playhead() if self._recorded is None else None
             if playhead is None:
                 self.go_to(simulated)
-                return
+                return '' if self._recorded is None else _missing(
+                    simulated, 0.0, self._recorded.duration, False)
             clip = playhead.clip
-            index = clip.index(playhead.time(time.monotonic()))
-            starts = np.flatnonzero(clip.resets)
-            first = max((int(start) for start in starts if start <= index), default=0)
-            end = min((int(start) for start in starts if start > index), default=len(clip.times))
-            times = [clip.frame(k).time for k in range(first, end)]
-            found = first + max(int(np.searchsorted(times, simulated + 5e-10, 'right')) - 1, 0)
+            run = clip.run(clip.index(playhead.time(time.monotonic())))
+            times = [clip.frame(k).time for k in run]
+            found = run[max(int(np.searchsorted(times, simulated + 5e-10, 'right')) - 1, 0)]
             self.go_to(float(clip.times[found] - clip.times[0]))
+            return _missing(simulated, times[0], times[-1], clip.is_cut and run.start == 0)
 
     def go_live(self) -> None:
         """Show the newest frame."""
@@ -176,3 +177,15 @@ class Timeline:
             self._playhead = Playhead(clip, clip.duration, self._source.status.real_time_factor)
         self._held = None
         return self._playhead
+
+
+def _missing(simulated: float, first: float, last: float, is_cut: bool) -> str:
+    """Why a time, s, is not shown, of a run that is kept from ``first`` to ``last`` s; empty if it
+    is. ``is_cut``: what was before has made room.
+    """
+    kept = f'kept: {first:.2f} to {last:.2f} s'
+    if simulated < first and is_cut:
+        return f'{kept}; what is older made room, as {MAX_FRAMES} ticks or 40 MB are kept'
+    if simulated < first and first > 0:
+        return f'{kept}; the page was opened then'
+    return kept if not first <= simulated <= last + 1e-6 else ''

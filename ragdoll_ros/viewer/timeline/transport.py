@@ -155,6 +155,12 @@ class Transport:
                 sent.update(changes)
                 run_script(client, SHOW % json.dumps(changes))
 
+    def _note(self, page: int, text: str) -> None:
+        """Show a text at a page's field of the time; none if it is empty."""
+        client = self._server.get_clients().get(page)
+        if client is not None:
+            run_script(client, f'window.ragdollTimeNote?.({json.dumps(text)});')
+
     def _take(self, page: int, text: str) -> None:
         """An event of transport.js; of viser's thread. Done in order in another, as steps wait."""
         asyncio.get_running_loop().run_in_executor(self._worker, self._act, page, text)
@@ -169,8 +175,8 @@ class Transport:
             'focus': lambda: self._timeline.hold(page),
             'blur': lambda: self._timeline.release(page)}
         values: dict[str, Callable[[float], None]] = {
-            'position': self._timeline.go_to, 'time': self._timeline.go_to_time,
-            'speed': self.set_speed}
+            'position': self._timeline.go_to, 'speed': self.set_speed,
+            'time': lambda time: self._note(page, self._timeline.go_to_time(time))}
         if action in actions:
             actions[action]()
         elif action in values:
