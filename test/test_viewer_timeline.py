@@ -341,7 +341,7 @@ def test_a_typed_time_is_that_of_the_shown_run():
             wait(lambda instant=instant: page.frame.time == pytest.approx(instant, abs=1e-9))
             assert page.frame.run == run and not page.timeline.is_live
         assert page.timeline.go_to_time(0.25) == ''
-        assert page.timeline.go_to_time(-1.0).startswith('kept: 0.00 to ')
+        assert page.timeline.go_to_time(-1.0).startswith('This run is kept from 0.00 to ')
         client.steer(page, 'time 99')
         wait(lambda: page.frame is page.timeline.clip.frame(len(page.timeline.clip.times) - 1))
 
@@ -354,12 +354,14 @@ def test_a_typed_time_that_is_not_kept_says_why(monkeypatch):
     for tick in range(10, 50):
         timeline.add(frame(tick / 100))
     assert timeline.go_to_time(0.3) == ''
-    assert timeline.go_to_time(0.0) == 'kept: 0.10 to 0.49 s; the page was opened then'
-    assert timeline.go_to_time(0.5) == 'kept: 0.10 to 0.49 s'
+    assert timeline.go_to_time(0.0) == ('This run is kept from 0.10 to 0.49 s; the page was opened '
+                                        'then')
+    assert timeline.go_to_time(0.5) == 'This run is kept from 0.10 to 0.49 s'
     timeline.go_live()
     for tick in range(50, 80):
         timeline.add(frame(tick / 100))
-    assert timeline.go_to_time(0.29).startswith('kept: 0.30 to 0.79 s; what is older made room')
+    assert timeline.go_to_time(0.29).startswith(
+        'This run is kept from 0.30 to 0.79 s; what is older made room')
     source.close()
 
 

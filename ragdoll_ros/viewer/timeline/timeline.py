@@ -183,7 +183,7 @@ def _missing(simulated: float, first: float, last: float, is_cut: bool) -> str:
     """Why a time, s, is not shown, of a run that is kept from ``first`` to ``last`` s; empty if it
     is. ``is_cut``: what was before has made room.
     """
-    kept = f'kept: {first:.2f} to {last:.2f} s'
+    kept = f'This run is kept from {first:.2f} to {last:.2f} s'
     if simulated < first and is_cut:
         return f'{kept}; what is older made room, as {MAX_FRAMES} ticks or 40 MB are kept'
     if simulated < first and first > 0:
