@@ -16,7 +16,7 @@ MAX_FRAMES = 30_000
 """Five minutes in ticks of 10 ms. Objects are half as large as the numbers of ten bones."""
 
 MAX_NUMBERS = 5_000_000
-"""40 MB: MAX_FRAMES of a doll of ten bones, a minute of six; less time of more dolls."""
+"""40 MB: MAX_FRAMES of a doll of ten bones, half of that with contacts; less of more dolls."""
 
 TOUCH = 1e-3
 """m above the ground at which a bone counts as touching it, also while it bounces."""
