@@ -213,6 +213,7 @@ def test_contacts_with_bodies_are_on_the_timeline(no_node, nodes, page, peer):
                    for k in np.flatnonzero(clip.touching))
 
     wait(lambda: page.frame.scene.name == 'stairs' and touched_above_ground())
+    end(nodes[-1], signal.SIGINT)
 
 
 def test_impacts_are_seen_for_a_second(no_node, nodes, remote, peer):
@@ -464,6 +465,7 @@ def test_a_scene_whose_files_are_not_here_is_shown_by_its_urdf(no_node, nodes, r
     assert remote.frame.scene.bone_names == scene.bone_names
     assert np.allclose([bone.shape.half_extents for bone in remote.frame.scene.bones],
                        [bone.shape.half_extents for bone in scene.bones])
+    end(nodes[-1], signal.SIGINT)
 
 
 def test_no_frame_has_the_scene_before(peer):
