@@ -137,8 +137,8 @@ def test_the_same_falls_on_a_mat(tmp_path):
     assert plain.digest != soft.digest
     assert hard.drawn == mat.drawn
     assert (hard.states == mat.states).all()
-    assert (mat.pulses >= hard.pulses).all()
-    assert (mat.pulses > hard.pulses).any()
+    first = np.flatnonzero((mat.pulses != hard.pulses).any(axis=1))[0]
+    assert mat.pulses[first, 1] > hard.pulses[first, 1]
     blows = [(fall.worst_impacts.by_region['pelvis'].peak_force) for fall in (hard, mat)]
     assert blows[1] == pytest.approx(blows[0] * math.sqrt(MAT / (MAT + TISSUE)))
 

@@ -58,9 +58,9 @@ class Fall:
     """Each impact of a bone, by time, once: of two bones that meet, that of the first."""
     feet: tuple[str, ...] = ()
     """Bones that may touch the ground before the impact."""
-    pulses: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    """((t - 1) samples_per_frame,) s: duration of the impacts in the samples after the first; 0
-    where there is none."""
+    pulses: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    """((t - 1) samples_per_frame, 2) s: how long after a sample the pulse of its impacts begins,
+    and how long it lasts, of the samples after the first; 0 where there is none."""
 
     @property
     def masses(self) -> np.ndarray:

@@ -19,6 +19,7 @@ from ..physics.rigid_body import GroundHeights
 from ..physics.sensors.contact_pulse import PulseLaw, PulseLog
 from ..physics.sensors.impacts import Impact, bones_that_hit
 from ..physics.sensors.joint_stop import JointStops
+from ..physics.sensors.soft_joints import SoftJoints
 from ..physics.simulation import Simulation
 from .fall import Fall
 from .recipe import Recipe
@@ -76,7 +77,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
                 recipe.samples_per_frame, frames.imu_states, frames.valid, failure, phases, excess,
                 recipe.philox_key, hits.worst, tuple(hits.contacts), tuple(recipe.data['feet']),
-                hits.pulses.durations)
+                hits.pulses.pulses)
 
 
 class _Hits:
@@ -103,11 +104,14 @@ class _Hits:
         stops, per_frame = (JointStops(scene, end_widths(scene.dolls[0].doll)),
                             recipe.samples_per_frame)
         joints = list(zip(frames.angles, frames.rates, strict=True))[:frames.valid]
+        soft = SoftJoints(len(joints), len(scene.angle_names), 1 / recipe.rate)
         for at, (before, after) in enumerate(itertools.pairwise(joints)):
-            for stop in stops.find(before, after, 1 / recipe.rate):
+            first, last = at * per_frame, (at + 1) * per_frame
+            for stop in stops.find(before, after, 1 / recipe.rate, soft):
                 # When within the tick is not known; what else it has is little beside.
-                for sample in range(per_frame):
-                    self.pulses.enter(at * per_frame + sample, *stop)
+                for sample in range(first, last):
+                    self.pulses.enter(sample, *stop)
+            soft.advance(after[1] - before[1], *self.pulses.between(first, last))
 
 
 def _once(impacts: Sequence[Impact]) -> Iterator[Impact]:

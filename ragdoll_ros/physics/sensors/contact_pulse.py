@@ -20,6 +20,9 @@ from ...model.biomechanical_limits import BiomechanicalLimits
 from ...model.scene import SECOND, Scene
 from .impacts import Impact
 
+TINY = 1e-12
+"""s or N s: nothing, but it can be divided by."""
+
 
 class PulseLaw:
     """Durations of a scene's impacts, by the stiffness of the regions of ``limits`` and of the
@@ -59,42 +62,59 @@ class PulseLaw:
 
 
 class PulseLog:
-    """Durations of pulses by sample, each ``step`` s, from the impacts of successive ticks."""
+    """Pulses by sample, each ``step`` s, from the impacts of successive ticks."""
 
     def __init__(self, law: PulseLaw, count: int, step: float) -> None:
         self._law, self._step = law, step
-        self.durations = np.zeros(count)
-        """(count,) s; 0 where there was no impact."""
+        self.pulses = np.zeros((count, 2))
+        """(count, 2) s: how long after its sample a pulse begins, and how long it lasts; 0 where
+        there was no impact."""
         self._impulses = np.zeros(count)
 
     def add(self, impacts: Iterable[Impact]) -> None:
-        """Add the impacts of a tick."""
+        """Add the impacts of a tick.
+
+        An impulse beyond 2 mu v, all that a spring gives, does not count: the body hands it on from
+        other impacts and stops at the same time, and it lasts as long as they do.
+        """
         for impact in impacts:
             if duration := self._law.duration(impact):
-                self.enter(int(impact.time / SECOND / self._step), duration, impact.impulse)
+                self.enter(int(impact.time / SECOND / self._step), duration,
+                           min(impact.impulse, 2 * impact.effective_mass * impact.speed))
 
-    def enter(self, sample: int, duration: float, impulse: float) -> None:
+    def enter(self, sample: int, duration: float, impulse: float, delay: float = 0.0) -> None:
         """Enter what came with this ``impulse``, N s, in a sample. Several in one sample share a
-        pulse: its duration is the mean of theirs, each by its impulse.
+        pulse: its delay and duration, s, are the means of theirs, each by its impulse.
         """
-        if sample < len(self.durations):
+        if sample < len(self.pulses):
             self._impulses[sample] += impulse
-            self.durations[sample] += (duration - self.durations[sample]) * (
+            self.pulses[sample] += ((delay, duration) - self.pulses[sample]) * (
                 impulse / self._impulses[sample])
+
+    def between(self, first: int, last: int) -> np.ndarray:
+        """The pulse (2,) that samples ``first`` to ``last`` - 1 have together, likewise."""
+        impulses = self._impulses[first:last]
+        return impulses @ self.pulses[first:last] / max(impulses.sum(), TINY)
+
+
+def course(count: int, step: float, delay: float, duration: float) -> np.ndarray:
+    """Shares (count,) of a half-sine that come in successive samples of ``step`` s."""
+    phases = (np.arange(count + 1) * step - delay) * (np.pi / max(duration, TINY))
+    return np.diff((1 - np.cos(np.clip(phases, 0.0, np.pi))) / 2)
 
 
 def spread(velocities: np.ndarray, step: float, gravity: np.ndarray,
-           durations: np.ndarray) -> np.ndarray:
+           pulses: np.ndarray) -> np.ndarray:
     """Velocities (t + 1, 3) m/s of a sensor, world frame, from those of its point on the bone,
-    ``step`` s apart, and the duration of the pulse of each sample (t,), s. What a sample with a
-    pulse changes beyond gravity is given as a half-sine from the sample's beginning on.
+    ``step`` s apart, and the delay and duration of the pulse of each sample (t, 2), s. What a
+    sample with a pulse changes beyond gravity is given as a half-sine.
     """
     changes = np.diff(velocities, axis=0) - gravity * step
     given = changes.copy()
-    for at in np.flatnonzero(durations > step).tolist():
-        count = min(math.ceil(durations[at] / step), len(changes) - at)
-        phases = np.pi * np.clip(np.arange(count + 1) * (step / durations[at]), 0.0, 1.0)
+    ends = pulses.sum(axis=1)
+    for at in np.flatnonzero(ends > step).tolist():
+        count = min(math.ceil(ends[at] / step), len(changes) - at)
         given[at] -= changes[at]
-        given[at:at + count] += np.diff((1 - np.cos(phases)) / 2)[:, None] * changes[at]
+        given[at:at + count] += course(count, step, *pulses[at])[:, None] * changes[at]
     late = np.concatenate([np.zeros((1, 3)), np.cumsum(changes - given, axis=0)])
     return velocities - late

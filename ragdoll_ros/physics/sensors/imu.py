@@ -82,7 +82,7 @@ def imu_samples(rows: np.ndarray, mount: ImuMount, step: float, gravity: Sequenc
     """Samples (t, 6) between states of a bone that are ``step`` s apart, rows (t + 1, 13): specific
     force, m/s^2, and angular rate, rad/s, in the sensor's frame (REP 145). ``response`` has the
     state of a soft mount and a low-pass filter; the mount acts on the force alone. ``pulses``
-    (t,) are the durations, s, over which the impacts in each sample are spread, the force alone.
+    (t, 2), as of PulseLog, spread the impacts in each sample over time, the force alone.
 
     The specific force is -gravity at rest and 0 in free fall. Rotations above pi in one sample are
     aliased.

@@ -3,7 +3,8 @@
 A rigid joint stops at its limit in an instant. A joint of a person is stopped by a torque that
 grows e-fold per width w, rad (model/passive.py): a joint that comes with the rate r has the
 deceleration r^2 / 2 w sech^2(r t / 2 w) until it turns, whatever its inertia and the size of the
-torque. A half-sine of the same peak that stops it lasts pi w / r.
+torque. A half-sine of the same peak that stops it lasts pi w / r. Where other pulses still bring
+the joint its rate, it comes later: see soft_joints.py.
 """
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from ...model.ragdoll import Joint, Ragdoll
 from ...model.scene import Scene
+from .soft_joints import SoftJoints
 
 SLOWEST = 1.0
 """rad/s: a slower stop hardly accelerates anything."""
@@ -29,12 +31,13 @@ become faster on the way.
 
 
 class Stop(NamedTuple):
-    """Duration, s, of the stop of a joint angle that has met its limit, and the impulse, N s, of
-    what hangs on it, at the distance of its radius of gyration.
+    """Duration, s, of the stop of a joint angle that has met its limit, the impulse, N s, of what
+    hangs on it, at the distance of its radius of gyration, and how much later it begins, s.
     """
 
     duration: float
     impulse: float
+    delay: float = 0.0
 
 
 class JointStops:
@@ -55,15 +58,21 @@ class JointStops:
         self._masses = np.array([_first_moment(doll, joint) for joint, _, _, doll in angles])
 
     def find(self, before: tuple[np.ndarray, np.ndarray], after: tuple[np.ndarray, np.ndarray],
-             step: float) -> list[Stop]:
-        """Stops in a tick of ``step`` s, from angles and rates (k,) before and after it."""
+             step: float, soft: SoftJoints | None = None) -> list[Stop]:
+        """Stops in a tick of ``step`` s, from angles and rates (k,) before and after it; ``soft``
+        knows what earlier pulses have still to give at its beginning.
+        """
         signs = np.array([[-1.0], [1.0]])
         angle, rate, left = signs * before[0], signs * before[1], signs * after[1]
         near = angle + REACH * step * np.maximum(rate, SLOWEST) >= self._ends
         stops = near & (rate > SLOWEST) & (left < STOPPED * rate) & np.isfinite(self._widths)
-        return [Stop(float(math.pi * self._widths[end, k] / rate[end, k]),
-                     float(self._masses[k] * rate[end, k]))
+        return [self._stop(end, k, float(rate[end, k]), soft)
                 for end, k in np.argwhere(stops).tolist()]
+
+    def _stop(self, end: int, k: int, rate: float, soft: SoftJoints | None) -> Stop:
+        delay, more = soft.arrival(k, -1 if end == 0 else 1, rate) if soft else (0.0, 0.0)
+        return Stop(float(math.pi * self._widths[end, k] / rate) + more,
+                    float(self._masses[k] * rate), delay)
 
 
 def _first_moment(doll: Ragdoll, joint: Joint) -> float:
