@@ -1,6 +1,9 @@
 """A sensor reads impacts for as long as the contact law's pulse: against an integrated spring."""
 import dataclasses
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -258,3 +261,13 @@ def test_what_is_handed_on_lasts_as_long_as_its_cause():
     log.add([pressed])
     log.enter(0, 0.15, 2 * hit.effective_mass * hit.speed)
     assert log.pulses[0] == pytest.approx((0, (law.duration(pressed) + 0.15) / 2))
+
+
+def test_stops_are_the_same_in_every_process():
+    """Names are hashed with another seed in each; sums of masses must not depend on it."""
+    code = ('from ragdoll_ros import load_scene; from ragdoll_ros.physics.sensors.joint_stop import '
+            'JointStops; print(JointStops(load_scene("man_faints"), {})._masses.tobytes().hex())')
+    first, second = (subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                                    check=True, env={**os.environ, 'PYTHONHASHSEED': seed}).stdout
+                     for seed in ('1', '2'))
+    assert first == second != ''

@@ -93,8 +93,8 @@ class PulseLog:
 
     def between(self, first: int, last: int) -> np.ndarray:
         """The pulse (2,) that samples ``first`` to ``last`` - 1 have together, likewise."""
-        impulses = self._impulses[first:last]
-        return impulses @ self.pulses[first:last] / max(impulses.sum(), TINY)
+        impulses = self._impulses[first:last, None]
+        return (impulses * self.pulses[first:last]).sum(axis=0) / max(impulses.sum(), TINY)
 
 
 def course(count: int, step: float, delay: float, duration: float) -> np.ndarray:

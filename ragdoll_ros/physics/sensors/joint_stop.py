@@ -83,8 +83,8 @@ def _first_moment(doll: Ragdoll, joint: Joint) -> float:
     for other in doll.joints_depth_first():
         if other.parent in hanging:
             hanging.add(other.child)
-    for name in hanging:
-        bone = doll.bone(name)
+    # In the order of bones: that of a set differs between processes.
+    for bone in (bone for bone in doll.bones if bone.name in hanging):
         away = np.array(bone.position) - joint.anchor
         total += 2 * bone.mass * float(away @ away) + sum(bone.inertia)
         mass += bone.mass
