@@ -265,8 +265,9 @@ def test_what_is_handed_on_lasts_as_long_as_its_cause():
 
 def test_stops_are_the_same_in_every_process():
     """Names are hashed with another seed in each; sums of masses must not depend on it."""
-    code = ('from ragdoll_ros import load_scene; from ragdoll_ros.physics.sensors.joint_stop import '
-            'JointStops; print(JointStops(load_scene("man_faints"), {})._masses.tobytes().hex())')
+    code = ('from ragdoll_ros import load_scene\n'
+            'from ragdoll_ros.physics.sensors.joint_stop import JointStops\n'
+            'print(JointStops(load_scene("man_faints"), {})._masses.tobytes().hex())')
     first, second = (subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                                     check=True, env={**os.environ, 'PYTHONHASHSEED': seed}).stdout
                      for seed in ('1', '2'))
