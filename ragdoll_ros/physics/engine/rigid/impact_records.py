@@ -19,8 +19,12 @@ def logged_impacts(log: np.ndarray, pairs: np.ndarray, since: float, dropped: in
 
 def join_impacts(parts: Sequence[Impacts]) -> Impacts:
     """All impacts of ``parts``, by time; equal times in the order of the parts."""
-    parts = [*parts, logged_impacts(np.zeros(0, IMPACT), np.zeros((0, 3), np.int64), 0.0, 0)]
+    if not parts:
+        return NO_IMPACTS
     order = np.argsort(np.concatenate([part.elapsed for part in parts]), kind='stable')
     arrays = [field.name for field in dataclasses.fields(Impacts) if field.name != 'dropped']
     return Impacts(**{name: np.concatenate([getattr(part, name) for part in parts])[order]
                       for name in arrays}, dropped=sum(part.dropped for part in parts))
+
+
+NO_IMPACTS = logged_impacts(np.zeros(0, IMPACT), np.zeros((0, 3), np.int64), 0.0, 0)
