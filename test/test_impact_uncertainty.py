@@ -170,7 +170,7 @@ def test_the_uncertainty_is_the_factor_times_the_difference():
 def test_a_difference_is_no_less_than_that_of_the_motions():
     """Both runs have the same figures by chance, 20 um and 0.01 m/s apart."""
     hit = impact(10, speed=2.0)
-    unsure = uncertainty_of(hit, hit, 2e-5, 0.01)
+    unsure = uncertainty_of(hit, hit, place=2e-5, velocity=0.01)
     assert unsure.time == pytest.approx(FACTOR * 1e-5, rel=0.01)
     assert unsure.speed == pytest.approx(FACTOR * 0.01, rel=1e-3)
     assert unsure.effective_mass == pytest.approx(FACTOR * 4.0 * 2e-4, rel=0.01)
@@ -182,7 +182,7 @@ def test_what_may_not_happen_and_what_has_no_partner_is_unknown():
     hit = impact(10, speed=0.1)
     for finer, velocity in ((None, 0.0), (impact(10, speed=0.11), 0.02),
                             (impact(10, speed=0.12), 0.0)):
-        unsure = uncertainty_of(hit, finer, 0.0, velocity)
+        unsure = uncertainty_of(hit, finer, velocity=velocity)
         assert all(map(math.isnan, dataclasses.astuple(unsure)))
 
 

@@ -10,7 +10,7 @@ pytest.importorskip('numba')
 
 from kept_code import kept
 
-from ragdoll_ros.physics.kernels.contact.gaps import TOUCHING
+from ragdoll_ros.physics.accuracy import ACCURACIES, TOUCHING
 from ragdoll_ros.physics.kernels.stepping.position_correction import (
     clip_to_joint_limits,
 )
@@ -27,12 +27,16 @@ from ragdoll_ros.physics.kernels.stepping.time_of_impact import (
     update_bracket,
 )
 from ragdoll_ros.physics.kernels.system import JOINT_LIMIT
-from ragdoll_ros.physics.kernels.workspace import BRACKET, GAP_COUNTS
+from ragdoll_ros.physics.kernels.workspace import (
+    BRACKET,
+    GAP_COUNTS,
+    STEP_SCALARS,
+)
 
 Scene = collections.namedtuple('Scene', 'pairs joint_limits body_doll dof_body')
 Gaps = collections.namedtuple('Gaps', 'gaps contacts step gap_counts')
 Contacts = collections.namedtuple('Contacts', 'gaps_end gaps_active')
-Step = collections.namedtuple('Step', 'bracket gaps_low gaps_high')
+Step = collections.namedtuple('Step', 'scalars bracket gaps_low gaps_high gaps_middle')
 
 
 def scene(*bounds):
@@ -42,11 +46,13 @@ def scene(*bounds):
                  np.arange(len(rows)))
 
 
-def gaps(start):
+def gaps(start, touching=TOUCHING):
     """What of a workspace gaps are."""
-    count = len(start)
+    count, scalars = len(start), np.zeros(1, STEP_SCALARS)
+    scalars['touching'] = touching
     return Gaps(np.array(start), Contacts(np.zeros(count), np.array(start)),
-                Step(np.zeros(1, BRACKET), np.zeros(count), np.zeros(count)),
+                Step(scalars, np.zeros(1, BRACKET), np.zeros(count), np.zeros(count),
+                     np.zeros(count)),
                 np.full(1, count, GAP_COUNTS))
 
 
@@ -67,7 +73,12 @@ def _tries(scene, ws, v, length, step, starts, falls, powers):
         overshot, landed, _ = impacts_at_end(scene, ws, length)
         if not update_bracket(scene, ws, length, overshot, landed):
             break
-        length = next_trial_step(scene, ws, v)
+        if tries == 1:  # the middle is at the velocities of the start, without forces
+            ws.step.gaps_middle[:] = starts - falls * (powers == 1) * length / step / 2
+            for k in range(len(v)):
+                ws.step.gaps_middle[2 * k] += v[k] * length / 2
+                ws.step.gaps_middle[2 * k + 1] -= v[k] * length / 2
+        length = next_trial_step(ws)
     return tries
 
 
@@ -86,9 +97,9 @@ def _clip_to_joint_limits(scene, q, correction):
     clip_to_joint_limits(scene, q, correction)
 
 
-def tries(starts, falls, powers, step=2e-3):
+def tries(starts, falls, powers, step=2e-3, touching=TOUCHING):
     """As many tries as are made, and the least gap at the end."""
-    ws, still = gaps(starts), np.zeros(0)
+    ws, still = gaps(starts, touching), np.zeros(0)
     made = _tries(scene(), ws, still, step, step, np.array(starts), np.array(falls),
                   np.array(powers))
     return made, ws.contacts.gaps_end.min()
@@ -119,6 +130,20 @@ def test_the_first_touch_of_several_gaps_is_met(seed):
         assert OVERSHOT <= least <= TOUCHING, (starts, falls, powers)
         worst = max(worst, made)
     assert worst <= MAX_TRIES
+
+
+@pytest.mark.parametrize('accuracy', ACCURACIES.values(), ids=ACCURACIES)
+def test_a_gap_that_falls_evenly_accelerated_is_met_at_the_second_try(accuracy):
+    """A parabola through its start, its rate there and its end is its whole course."""
+    draw, step = np.random.default_rng(1), accuracy.step
+    for _ in range(200):
+        start = draw.uniform(1e-3, 1e-2)  # rad: fast enough to be sought
+        rate, fall = draw.uniform(0, 2) * start, draw.uniform(0.1, 2) * start
+        ws, limits = gaps([1.0, start], accuracy.touching), scene((-1.0, start))
+        made = _tries(limits, ws, np.array([rate / step]), step, step, np.array([1.0, start]),
+                      np.array([0.0, start + fall]), np.full(2, 2.0))
+        assert made == 2
+        assert OVERSHOT <= ws.contacts.gaps_end[1] <= accuracy.touching
 
 
 def test_a_joint_is_taken_to_its_limit_by_its_rate():

@@ -3,6 +3,10 @@ from dataclasses import dataclass
 
 from ..model import errors
 
+TOUCHING, TOUCHING_SPEED = 1e-6, 2e-3
+"""m or rad, and m/s or rad/s: what is nearer than the first, or than the second times a step, if
+that is more, touches. In each step what rests drifts off by a term of third order in its length."""
+
 
 @dataclass(frozen=True)
 class Accuracy:
@@ -22,6 +26,11 @@ class Accuracy:
     solve_error: float = 1e-4
     """Residual to which the rigid engine solves the contacts of large islands, as a share of the
     largest velocity at them: as the step begins, or as it would end without contacts, if less."""
+
+    @property
+    def touching(self) -> float:
+        """Distance, m or rad, below which things touch in the rigid engine."""
+        return max(TOUCHING, TOUCHING_SPEED * self.step)
 
 
 DRAFT = Accuracy(step=4e-3, flight_error=1e-10, substeps=4, solve_error=1e-3)

@@ -20,7 +20,7 @@ from ..model import errors, rotation
 from ..model.biomechanical_limits import BiomechanicalLimits
 from ..model.scene import SECOND, Scene
 from ..model.state import State
-from .accuracy import EXACT, Accuracy, resolve_accuracy
+from .accuracy import EXACT, TOUCHING, Accuracy, resolve_accuracy
 from .sensors.impacts import Impact
 from .simulation import Simulation
 
@@ -45,9 +45,6 @@ distance and LEVER times the angle."""
 WINDOW = 0.01
 """s between an impact and its partner in the finer run, at most; at equal times their speeds differ
 by a factor of e at most."""
-
-TOUCHING = 1e-6
-"""m: what is nearer touches, so that the time of an impact is known to this over its speed."""
 
 ROUNDING = 1e-6
 """Share of a figure below which no uncertainty is."""
@@ -147,7 +144,8 @@ def impacts_with_uncertainty(
                     deviations += [deviation.of(scene, hit) for hit in coarse.impacts]
         dropped = coarse.dropped_impacts
     partners = partners_of(hits[:len(deviations)], finer)
-    known = [UncertainImpact(hit, partner, uncertainty_of(hit, partner, *deviation))
+    known = [UncertainImpact(hit, partner,
+                             uncertainty_of(hit, partner, accuracy.touching, *deviation))
              for hit, partner, deviation in zip(hits, partners, deviations, strict=False)]
     return UncertainImpacts(
         (*known, *(UncertainImpact(hit, None, ImpactUncertainty()) for hit in hits[len(known):])),
@@ -186,13 +184,14 @@ def partners_of(impacts: Sequence[Impact], others: Sequence[Impact]) -> list[Imp
     return partners
 
 
-def uncertainty_of(hit: Impact, finer: Impact | None, place: float = 0.0,
-                   velocity: float = 0.0) -> ImpactUncertainty:
+def uncertainty_of(hit: Impact, finer: Impact | None, touching: float = TOUCHING,
+                   place: float = 0.0, velocity: float = 0.0) -> ImpactUncertainty:
     """Uncertainties of the figures of an impact by its partner; they are unknown without one, and
     where the speed is not known to be above 0.
 
     ``place``, m, and ``velocity``, m/s, by which the motions of both runs differ where it meets,
-    are what times and speeds differ by at least, and so what follows from them.
+    are what times and speeds differ by at least, and so what follows from them. ``touching``, m: an
+    impact is early by that at most.
     """
     if finer is None:
         return ImpactUncertainty()
@@ -202,7 +201,7 @@ def uncertainty_of(hit: Impact, finer: Impact | None, place: float = 0.0,
               'duration': turned / 2}
     found = ImpactUncertainty(
         time=FACTOR * max(abs(hit.time - finer.time) / SECOND, place / hit.speed)
-        + TOUCHING / hit.speed,
+        + touching / hit.speed,
         **{name: FACTOR * max(abs(getattr(hit, name) - getattr(finer, name)),
                               share * getattr(hit, name)) + ROUNDING * getattr(hit, name)
            for name, share in shares.items()})

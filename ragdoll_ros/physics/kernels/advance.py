@@ -206,33 +206,36 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     ledger.all_cycles += cycles() - start_cycles
 
 
-@entry(ADDRESS[::1], REAL[::1], ADDRESS[:, ::1])
-def find_islands(job: np.ndarray, windows: np.ndarray, labels: np.ndarray) -> None:
+@entry(ADDRESS[::1], REAL[::1], ADDRESS[:, ::1], REAL)
+def find_islands(job: np.ndarray, windows: np.ndarray, labels: np.ndarray,
+                 touching: float) -> None:
     """Write to ``labels`` (k, d) which dolls of a cluster may meet within each of the ``windows``
-    (k,) s: the least index of the island of each doll. ``job``: see advance().
+    (k,) s: the least index of the island of each doll. ``job``, ``touching``: see advance().
     """
     system, workspace, cluster = vec(job)
     s, ws, state = system_at(system), workspace_at(workspace), cluster_state_at(cluster)
     current = ws.stats[0].gaps_current
+    ws.step.scalars[0].touching = touching
     refresh_gaps(s, ws, state)
     ws.stats[0].gaps_current = current
     for k in range(len(windows)):
         label_reachable(s, ws, ws.step.end, ws.gaps, windows[k], labels[k])
 
 
-@entry(ADDRESS[:, ::1], REAL, REAL, REAL, REAL)
+@entry(ADDRESS[:, ::1], REAL, REAL, REAL, REAL, REAL)
 def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float,
-            solve_error: float) -> None:
+            solve_error: float, touching: float) -> None:
     """Advance clusters independently by ``duration`` s and write their bone states and doll sums.
     ``duration`` 0: only recompute these and the gaps.
 
     ``jobs`` (k, 3): addresses of the bundles of system, workspace and state of each. ``step``:
     length of a contact step, s; ``tolerance``: error of a step of flight, m or rad;
-    ``solve_error``: see physics/accuracy.py.
+    ``solve_error``, ``touching``: see physics/accuracy.py.
     """
     for k in range(len(jobs)):
         system, workspace, cluster = vec(jobs[k])
         ws = workspace_at(workspace)
         ws.step.scalars[0].solve_error = solve_error
+        ws.step.scalars[0].touching = touching
         advance_cluster(system_at(system), ws, cluster_state_at(cluster), duration, step,
                         tolerance)

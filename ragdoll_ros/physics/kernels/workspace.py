@@ -47,12 +47,13 @@ it was last halved, and the chords since."""
 STEP_SCALARS = np.dtype([
     ('start_contact_count', np.int64), ('start_point_count', np.int64), ('tried_count', np.int64),
     ('tracks_points', np.int64), ('seeks_impacts', np.int64), ('correction_energy', float),
-    ('start_load_potential', float), ('residual', float), ('solve_error', float)], align=True)
+    ('start_load_potential', float), ('residual', float), ('solve_error', float),
+    ('touching', float)], align=True)
 """Of a contact step: contacts at its start, points that have gaps of their own then, and contacts
 in its last trial if that was as long; whether points have gaps now; whether it ends at impacts;
 potential energy that position correction adds, J; load_potential() at its start, J; the largest
-residual velocity of its large islands, m/s, and the share of the velocities that is allowed, see
-physics/accuracy.py."""
+residual velocity of its large islands, m/s, and the share of the velocities that is allowed, and
+the gap, m or rad, up to which something touches, see physics/accuracy.py."""
 
 GAP_COUNTS = np.dtype([('fixed', np.int64), ('live', np.int64)], align=True)
 """Gaps of ground points, limits and pairs; these and those of contacts.points."""
@@ -111,12 +112,13 @@ known; ``unknowns`` of newton.py, and a row of its matrix, ``combined``."""
 
 Step = collections.namedtuple(
     'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
-    'correction sums_before sums_after external islands bracket gaps_low gaps_high spin')
+    'correction sums_before sums_after external islands bracket gaps_low gaps_high gaps_middle '
+    'spin')
 """A contact step or an impact: its kinematics at ``start``, ``middle`` and ``end``; coordinates and
 velocities there; ``v_free`` without contacts, ``v_change`` by contacts; ``correction`` (nv,): the
 displacement of position correction. ``sums_before``, ``sums_after``, ``external`` (d,): of the
-dolls; ``islands`` (d,): of islands, at their labels. ``bracket`` (1,) with the gaps at its ends.
-``spin`` (3,) rad/s: scratch."""
+dolls; ``islands`` (d,): of islands, at their labels. ``bracket`` (1,) with the gaps at its ends,
+and those at the middle of the first trial. ``spin`` (3,) rad/s: scratch."""
 
 Flight = collections.namedtuple(
     'Flight', 'kinematics q v stages derivative contact_gaps motion')
@@ -150,7 +152,7 @@ def make_workspace(system: System, cluster: ClusterState) -> Workspace:
         sums_after=np.zeros(dolls, DOLL_SUMS), external=np.zeros(dolls, EXTERNAL_IMPULSE),
         islands=np.zeros(dolls, ISLAND_SUMS),
         bracket=np.zeros(1, BRACKET), gaps_low=np.zeros(gaps), gaps_high=np.zeros(gaps),
-        spin=np.zeros(3))
+        gaps_middle=np.zeros(gaps), spin=np.zeros(3))
     flight = Flight(
         kinematics=kinematics(), q=np.zeros(nq), v=np.zeros(nv), stages=np.zeros((16, nq + nv)),
         derivative=np.zeros(nq + nv), contact_gaps=np.zeros(gaps),

@@ -192,8 +192,7 @@ class Clusters:
         if np.count_nonzero(whole) < len(whole):  # a third of what all() costs
             jobs = jobs[:, whole]
         if self.workers == 1 or jobs.shape[1] < 2:
-            kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error,
-                            accuracy.solve_error)
+            kernels.advance(jobs[0], duration, *_tolerances(accuracy))
         else:
             self._advance_parallel(jobs, duration, accuracy, self._firsts[whole])
         for cluster in self._joined:
@@ -544,8 +543,7 @@ class Clusters:
 
         def work(worker: int) -> None:
             while (part := next(parts)) < shares:
-                kernels.advance(jobs[worker, order[part::shares]], duration, accuracy.step,
-                                accuracy.flight_error, accuracy.solve_error)
+                kernels.advance(jobs[worker, order[part::shares]], duration, *_tolerances(accuracy))
 
         others = [self._threads.submit(work, worker) for worker in range(1, self.workers)]
         work(0)
@@ -561,13 +559,14 @@ class Clusters:
         body_counts = np.array([len(self._bones[doll]) for doll in cluster.dolls])
         left, made = duration, {}
         while left > 0:
-            window, label = next_window(np.array(cluster.job(0)), body_counts, left)
+            window, label = next_window(np.array(cluster.job(0)), body_counts, left,
+                                        accuracy.touching)
             if not window and not made:
                 return False
             made = self._form_islands(cluster, label, made)
             window = window or left
             kernels.advance(np.array([island.job(0) for island in made.values()]), window,
-                            accuracy.step, accuracy.flight_error, accuracy.solve_error)
+                            *_tolerances(accuracy))
             for island in made.values():
                 if not self._is_single(island):
                     self._scatter_state(island)
@@ -699,6 +698,11 @@ def _every_pair(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _cluster_key(dolls: np.ndarray, pairs: np.ndarray, keys: np.ndarray) -> tuple:
     return dolls.tobytes(), pairs.tobytes(), keys.tobytes()
+
+
+def _tolerances(accuracy: Accuracy) -> tuple[float, float, float, float]:
+    """What kernels.advance() takes of an accuracy."""
+    return accuracy.step, accuracy.flight_error, accuracy.solve_error, accuracy.touching
 
 
 def _invalidate(cluster: Cluster) -> None:

@@ -17,15 +17,17 @@ MOST_HALVINGS = 6
 """How often the rest of a tick is halved at most to find a window."""
 
 
-def next_window(job: np.ndarray, body_counts: np.ndarray, left: float) -> tuple[float, np.ndarray]:
+def next_window(job: np.ndarray, body_counts: np.ndarray, left: float,
+                touching: float) -> tuple[float, np.ndarray]:
     """The longest window, ``left`` s halved some times, in which a cluster falls into islands of at
     most MOST_BODIES, and the island (d,) of each doll; 0 and one island where there is none.
 
     ``job``: of the cluster, see Cluster.job(). ``body_counts`` (d,): bodies of each doll.
+    ``touching``: see Accuracy.
     """
     windows = left / 2.0 ** np.arange(MOST_HALVINGS + 1)
     labels = np.zeros((len(windows), len(body_counts)), np.int64)
-    kernels.find_islands(job, windows, labels)
+    kernels.find_islands(job, windows, labels, touching)
     for window, label in zip(windows.tolist(), labels, strict=True):
         if np.bincount(label, body_counts).max() <= MOST_BODIES:
             return window, label

@@ -27,6 +27,9 @@ there."""
 TIE = 1e-10
 """m: an end of the axis within this of the deepest point is the deepest point."""
 
+DEEPEST = 2
+"""Feature id of the deepest point; those of the ends are 0 and 1."""
+
 MIN_DISTANCE_RATIO = 0.1
 """Least distance of two contacts of one capsule, as a part of its radius."""
 
@@ -163,7 +166,7 @@ def capsule_manifold(a: Shape, b: Shape, margin: float, sign: float,
     gap, n = signed_distance(b, add_scaled(p, deepest, u), u)
     if gap - radius > margin:
         return 0
-    feature_id, count = 2, 0
+    at_end, count = False, 0
     if gap < 0 and b.kind >= BOX and half > 0:
         gap, n = max_separation_axis(a, b, c, math.inf)
         n = to_local(b.rotation, n)
@@ -175,16 +178,15 @@ def capsule_manifold(a: Shape, b: Shape, margin: float, sign: float,
                 center = add_scaled(p, t, u)
                 other, normal = signed_distance(b, center, u)
                 if other <= gap + TIE:
-                    feature_id = -1
+                    at_end = True
                 elif abs(t - deepest) < MIN_DISTANCE_RATIO * radius:
-                    feature_id = k
                     continue
                 if other - radius <= margin:
                     manifold[count].feature_id = k
                     _put_ball(manifold[count], b, center, normal, other, radius, sign)
                     count += 1
-    if feature_id >= 0:
-        manifold[count].feature_id = feature_id
+    if not at_end:
+        manifold[count].feature_id = DEEPEST
         _put_ball(manifold[count], b, add_scaled(p, deepest, u), n, gap, radius, sign)
         count += 1
     return count

@@ -16,7 +16,7 @@ from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Contacts, Workspace
-from .gaps import FAR, MET, NONE, SLOW, TOUCHING, ground_point, plane_of
+from .gaps import FAR, MET, NONE, SLOW, ground_point, plane_of
 from .patch import contract_friction_points
 from .placed_shape import placed_shape
 from .point_gaps import points_at_start, takes_part
@@ -35,16 +35,16 @@ SAME_DIRECTION = 1e-3
 @compiled
 def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps: np.ndarray,
                   h: float) -> int:
-    """Write to contacts.found the contacts at q, the middle of a step of h s, whose gap in ``gaps``
-    is at most TOUCHING; h = 0: those at an instant. Of a pair they are the points whose own gap is,
-    or where they have none, those nearer than what closes slowly in h s, or than the pair has
-    closed since ws.gaps, if that is more. Returns their number. ``kin``: of q, with its geoms.
+    """Write to contacts.found the contacts at q, the middle of a step of h s, which touch by
+    ``gaps``; h = 0: those at an instant. Of a pair they are the points whose own gap touches, or
+    where they have none, those nearer than what closes slowly in h s, or than the pair has closed
+    since ws.gaps, if that is more. Returns their number. ``kin``: of q, with its geoms.
     """
-    m, n, contacts = 0, 0, ws.contacts.found
+    m, n, contacts, touching = 0, 0, ws.contacts.found, ws.step.scalars[0].touching
     for k in range(len(s.geoms)):
         if s.ground_offset[0] > -math.inf:
             for j in range(s.geoms[k].point_count):
-                if gaps[n + j] <= TOUCHING and m < len(contacts):
+                if gaps[n + j] <= touching and m < len(contacts):
                     contacts[m].id, contacts[m].patch = n + j, k
                     write_ground_contact(s, kin, k, j, vec(s.ground_normal), s.ground_offset[0],
                                          s.geoms[k], contacts[m])
@@ -52,20 +52,20 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
         n += s.geoms[k].point_count
     for k in range(len(s.joint_limits)):
         for side in range(2):
-            if gaps[n + side] <= TOUCHING and m < len(contacts):
+            if gaps[n + side] <= touching and m < len(contacts):
                 write_limit(s, q, k, side, n + side, contacts[m])
                 m += 1
         n += 2
     for k in range(len(s.pairs)):
-        if gaps[n + k] <= TOUCHING and s.geoms[s.pairs[k].b].kind == PLANE:
+        if gaps[n + k] <= touching and s.geoms[s.pairs[k].b].kind == PLANE:
             if m < len(contacts):
                 pair = s.pairs[k]
                 normal, offset = plane_of(kin, pair.b)
                 contacts[m].id, contacts[m].patch = n + k, len(s.geoms) + k - pair.point
                 write_ground_contact(s, kin, pair.a, pair.point, normal, offset, pair, contacts[m])
                 m += 1
-        elif gaps[n + k] <= TOUCHING:
-            near = max(SLOW * h if h > 0 else TOUCHING, ws.gaps[n + k] - gaps[n + k])
+        elif gaps[n + k] <= touching:
+            near = max(SLOW * h if h > 0 else touching, ws.gaps[n + k] - gaps[n + k])
             m = add_pair_contacts(s, ws, kin, q, k, m, near, h)
     set_friction_points(s, ws.contacts, kin, m)
     return m

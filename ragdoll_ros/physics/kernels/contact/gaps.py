@@ -21,9 +21,6 @@ from ..workspace import Contacts, Workspace
 from .internal_edges import FLUSH, is_at_internal_edge
 from .placed_shape import placed_shape
 
-TOUCHING = 1e-6
-"""m or rad: what is nearer touches."""
-
 MET = 1e-7
 """m or rad: geoms that are farther apart than this have no part in an impact, unless they approach
 or were nearer in the last step: balls that almost touch hit one after the other."""
@@ -150,7 +147,7 @@ def label_reachable(s: System, ws: Workspace, kin: Kinematics, gaps: np.ndarray,
             continue
         one, other = label[s.body_doll[a.body]], label[s.body_doll[b.body]]
         reach = geom_motion_bound(motion, a, h) + geom_motion_bound(motion, b, h)
-        if one != other and gaps[first + k] <= TOUCHING + MOST_SPEEDUP * reach:
+        if one != other and gaps[first + k] <= ws.step.scalars[0].touching + MOST_SPEEDUP * reach:
             low, high = min(one, other), max(one, other)
             for d in range(len(label)):
                 if label[d] == high:
@@ -342,3 +339,28 @@ def is_joint_limit_gap(s: System, ws: Workspace, j: int) -> bool:
     """Whether gap j is the distance of a joint from a limit, rad (else m)."""
     first = first_joint_limit_gap(s, ws)
     return first <= j < first + 2 * len(s.joint_limits)
+
+
+@compiled
+def one_gap(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, j: int) -> float:
+    """Gap j at q; ``kin``: of q, with its geoms. Not a number for those of points of a pair."""
+    n, first = 0, first_joint_limit_gap(s, ws)
+    for k in range(len(s.geoms)):
+        if n <= j < n + s.geoms[k].point_count:
+            normal = vec(s.ground_normal)
+            return dot(normal, ground_point(s, s.geoms[k], j - n, kin.geom_positions[k],
+                                            kin.geom_rotations[k], normal)) - s.ground_offset[0]
+        n += s.geoms[k].point_count
+    if is_joint_limit_gap(s, ws, j):
+        limit = s.joint_limits[(j - first) // 2]
+        return limit.upper - q[limit.q] if (j - first) % 2 else q[limit.q] - limit.lower
+    k = j - (ws.gap_counts[0].fixed - len(s.pairs))
+    if k >= len(s.pairs):
+        return math.nan
+    pair = s.pairs[k]
+    if s.geoms[pair.b].kind == PLANE:
+        normal, offset = plane_of(kin, pair.b)
+        return dot(normal, ground_point(s, s.geoms[pair.a], pair.point,
+                                        kin.geom_positions[pair.a], kin.geom_rotations[pair.a],
+                                        normal)) - offset
+    return pair_gap(s, k, kin)

@@ -3,8 +3,8 @@
 The ground and planes have a gap for each point that may touch them. Of other shapes the points are
 those of the contact manifold, in a step those of the pairs that touch as it begins: each is known
 by its feature id, and has a gap, after those of all pairs, at the step's start and at the end of
-each trial. A feature that is in the manifold at the end of a trial alone is taken to have had, at
-the start, the gap from which its velocity at the end leads there.
+each trial. A feature that is in the manifold at the end of a trial alone had, at the start, the gap
+between the points of both bodies that are there at the end.
 """
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..collision.narrow_phase import collide
 from ..collision.shapes import PLANE, TRIANGLE
 from ..compiling.decorators import compiled
 from ..dynamics.kinematics import Kinematics
-from ..maths.vectors import vec
+from ..maths.vectors import add, dot, sub, to_local, to_world, vec
 from ..system import MAX_MANIFOLD_POINTS, System
 from ..workspace import Workspace
-from .gaps import EXCLUDED, FAR, NONE, SLOW, TOUCHING, pair_gap, past_internal_edges
+from .gaps import EXCLUDED, FAR, NONE, SLOW, pair_gap, past_internal_edges
 from .jacobian import normal_velocity
 from .placed_shape import placed_shape
 
@@ -28,10 +28,11 @@ def track_points(s: System, ws: Workspace, kin: Kinematics) -> None:
     contacts.points, and their gaps to ws.gaps. ``kin``: of the start, with its geoms.
     """
     counts, contacts, count = ws.gap_counts[0], ws.contacts, 0
+    touching = ws.step.scalars[0].touching
     first = counts.fixed - len(s.pairs)
     for k in range(len(s.pairs)):
         contacts.first_point[k] = NONE
-        if ws.gaps[first + k] > TOUCHING or s.geoms[s.pairs[k].b].kind == PLANE or (
+        if ws.gaps[first + k] > touching or s.geoms[s.pairs[k].b].kind == PLANE or (
                 count + MAX_MANIFOLD_POINTS > len(contacts.points)):
             continue
         contacts.first_point[k] = count
@@ -78,20 +79,36 @@ def find_point(ws: Workspace, k: int, feature_id: int) -> int:
 
 
 @compiled
-def add_point(ws: Workspace, k: int, at: np.record, rate: float, h: float) -> int:
-    """Give a point of pair k, ``at`` the end of a trial of h s, a gap: one that closes at ``rate``
-    m/s. Returns its index in contacts.points, NONE if there is no room.
+def add_point(s: System, ws: Workspace, kin: Kinematics, k: int, at: np.record, h: float) -> int:
+    """Give a point of pair k, ``at`` the end of a trial of h s, a gap. Returns its index in
+    contacts.points, NONE if there is no room. ``kin``: of the end, with its geoms.
     """
     counts, contacts = ws.gap_counts[0], ws.contacts
     i, j = counts.live - counts.fixed, counts.live
     if j == len(ws.gaps):
         return NONE
     contacts.points[i], contacts.point_pair[i] = at, k
-    ws.gaps[j] = contacts.gaps_active[j] = at.gap + rate * h
-    ws.step.gaps_low[j] = at.gap + rate * (h - ws.step.bracket[0].low)
+    ws.gaps[j] = contacts.gaps_active[j] = gap_at_start(s, ws, kin, k, at)
+    ws.step.gaps_low[j] = (ws.gaps[j] + (at.gap - ws.gaps[j]) * ws.step.bracket[0].low / h
+                           - ws.step.scalars[0].touching / 2)
     ws.step.gaps_high[j] = EXCLUDED
     counts.live += 1
     return i
+
+
+@compiled
+def gap_at_start(s: System, ws: Workspace, kin: Kinematics, k: int, at: np.record) -> float:
+    """Gap, m, at the start of the step between the points of both geoms of pair k that meet ``at``
+    the end of it. ``kin``: of the end, with its geoms.
+    """
+    start, a, b = ws.step.start, s.pairs[k].a, s.pairs[k].b
+    r, r_start = kin.geom_rotations[b], start.geom_rotations[b]
+    normal = to_world(r_start, to_local(r, vec(at.normal)))
+    on_b = to_world(r_start, to_local(r, sub(vec(at.point), vec(kin.geom_positions[b]))))
+    r, r_start = kin.geom_rotations[a], start.geom_rotations[a]
+    on_a = to_world(r_start, to_local(r, sub(vec(at.point), vec(kin.geom_positions[a]))))
+    apart = sub(add(on_a, vec(start.geom_positions[a])), add(on_b, vec(start.geom_positions[b])))
+    return at.gap + dot(normal, apart)
 
 
 @compiled
@@ -127,8 +144,8 @@ def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
         for j in range(found):
             at = contacts.manifold[j]
             i = find_point(ws, k, at.feature_id)
-            if i == NONE and at.gap <= TOUCHING:
-                i = add_point(ws, k, at, approach_speed(s, kin, q, k, at), h)
+            if i == NONE and at.gap <= ws.step.scalars[0].touching:
+                i = add_point(s, ws, kin, k, at, h)
             if i != NONE:
                 out[counts.fixed + i] = at.gap
 
@@ -142,7 +159,7 @@ def takes_part(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int,
     """
     i = find_point(ws, k, at.feature_id)
     if i != NONE:
-        return ws.contacts.gaps_active[ws.gap_counts[0].fixed + i] <= TOUCHING
+        return ws.contacts.gaps_active[ws.gap_counts[0].fixed + i] <= ws.step.scalars[0].touching
     return at.gap + max(0.0, approach_speed(s, kin, q, k, at)) * h / 2 <= SLOW * h
 
 

@@ -9,7 +9,7 @@ from ..cluster_state import ClusterState
 from ..collision.narrow_phase import collide
 from ..collision.shapes import PLANE
 from ..compiling.decorators import compiled
-from ..contact.gaps import (FAR, NEAR, TOUCHING, ground_point, plane_of,
+from ..contact.gaps import (FAR, NEAR, ground_point, plane_of,
                             update_kinematics_and_gaps)
 from ..contact.jacobian import normal_velocity
 from ..contact.placed_shape import placed_shape
@@ -22,6 +22,9 @@ from .dense_step import ACCELERATION_FACTOR, acceleration_bounds, evaluate_dense
 
 CLOSED = 1e-11
 """m or rad: the gap that is left at the time of a contact."""
+
+TOUCHING = 1e-6
+"""m or rad: what is farther has separated."""
 
 DEEPEST_START = -10 * TOUCHING
 """m or rad: least gap with which a flight may begin; deeper ones are corrected by contact steps."""

@@ -22,7 +22,7 @@ from .first_contact import set_contact_gaps, time_without_contact
 
 SEPARATION_SPEED = 5e-3
 """m/s or rad/s at which contacts separate for a flight: to 1.3 um under gravity, which is what
-TOUCHING can tell."""
+first_contact.TOUCHING can tell."""
 
 STILL = 1e-6
 """rad/s, or rad/s^2, at which a joint that leans on its limit does not press on it."""

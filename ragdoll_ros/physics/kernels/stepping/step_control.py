@@ -3,12 +3,14 @@ and the penetrations that it adds.
 """
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..cluster_state import ClusterState
 from ..compiling.cycles import cycles
 from ..compiling.decorators import compiled
-from ..contact.gaps import (BEYOND_LIMIT, SLOW, TOUCHING, is_joint_limit_gap,
+from ..contact.gaps import (BEYOND_LIMIT, SLOW, is_joint_limit_gap,
                             update_kinematics_and_gaps)
 from ..contact.point_gaps import has_point_gaps, update_point_gaps
 from ..dynamics.kinematics import integrate_positions
@@ -20,7 +22,7 @@ from .momentum import (REMOVABLE, count_contact_impulses, internal_kinetic_energ
                        total_energy)
 from .position_correction import PAID_SHARE
 from .time_of_impact import (OVERSHOT, impacts_at_end, is_fast_impact, next_trial_step,
-                             open_bracket, step_to_joint_limit, update_bracket)
+                             open_bracket, step_to_joint_limit, update_bracket, update_middle_gaps)
 from .warm_start import jam_threshold
 
 MAX_TRIES = 20
@@ -119,7 +121,9 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         overshot, landed, fast = impacts_at_end(s, ws, length)
         hit = seek and fast
         if seek and turn < MAX_TRIES - 1 and update_bracket(s, ws, length, overshot, landed):
-            length = next_trial_step(s, ws, cluster.v)
+            if step.bracket[0].halved_width == math.inf:
+                update_middle_gaps(s, ws)
+            length = next_trial_step(ws)
             ledger.past_impact += 1
             continue
         gained -= stats.work_position_correction - corrections
@@ -152,10 +156,11 @@ def begin_trials(s: System, ws: Workspace, cluster: ClusterState, h: float,
     if share < 1 and h > COARSEST * nominal:
         h = max(share * h, COARSEST * nominal)
         predict_contacts(s, ws, cluster, h, nominal)
+    touching = ws.step.scalars[0].touching
     for j in range(ws.gap_counts[0].live):
         if ws.contacts.gaps_end[j] < ws.gaps[j] - ws.contacts.gaps_end[j] or (
                 ws.gaps[j] < SPECULATIVE):
-            ws.contacts.gaps_active[j] = min(TOUCHING, ws.gaps[j], ws.contacts.gaps_end[j])
+            ws.contacts.gaps_active[j] = min(touching, ws.gaps[j], ws.contacts.gaps_end[j])
     return h
 
 
@@ -200,11 +205,11 @@ def unseen_share(s: System, ws: Workspace, max_depth: float) -> float:
     """Share of the step just taken after which no gap that was open as it began is below minus
     ``max_depth``, m, or UNSEEN_TURN, if all close evenly; 1 if none is at its end.
     """
-    share = 1.0
+    share, touching = 1.0, ws.step.scalars[0].touching
     for j in range(ws.gap_counts[0].live):
         most = UNSEEN_TURN if is_joint_limit_gap(s, ws, j) else max_depth
         start, end = ws.contacts.gaps_active[j], ws.contacts.gaps_end[j]
-        if start > TOUCHING and end < -most:
+        if start > touching and end < -most:
             share = min(share, SAFETY * (start + most) / (start - end))
     return share
 
@@ -216,13 +221,14 @@ def activate_contacts(s: System, ws: Workspace, h: float) -> bool:
     impulses of the first will close some of them. Returns whether there are any.
     """
     active, end, some = ws.contacts.gaps_active, ws.contacts.gaps_end, False
+    touching = ws.step.scalars[0].touching
     for j in range(ws.gap_counts[0].live):
-        if active[j] > TOUCHING and (end[j] < OVERSHOT or is_fast_impact(s, ws, j, h)):
+        if active[j] > touching and (end[j] < OVERSHOT or is_fast_impact(s, ws, j, h)):
             some = True
     if some:
         for j in range(ws.gap_counts[0].live):
-            if active[j] > TOUCHING and end[j] < ws.gaps[j] - end[j]:
-                active[j] = min(end[j], TOUCHING)
+            if active[j] > touching and end[j] < ws.gaps[j] - end[j]:
+                active[j] = min(end[j], touching)
     return some
 
 
@@ -272,10 +278,12 @@ def penetrates_further(s: System, ws: Workspace) -> bool:
     """Whether a contact of the step, also a speculative one, ends deeper than MAX_PENETRATION or
     BEYOND_LIMIT, and by a tenth of it deeper than at the start.
     """
+    touching = ws.step.scalars[0].touching
     for j in range(ws.gap_counts[0].live):
         most = BEYOND_LIMIT if is_joint_limit_gap(s, ws, j) else MAX_PENETRATION
         end = ws.contacts.gaps_end[j]
-        if end < -most and ws.contacts.gaps_active[j] <= TOUCHING and (
+        if end < -most and ws.contacts.gaps_active[j] <= touching and (
                 end < ws.gaps[j] - most / 10) and not has_point_gaps(s, ws, j):
             return True
     return False
+

@@ -3,9 +3,10 @@
 Geoms that are apart when a step begins may meet before it ends. A length at which nothing has met
 and one at which something has bracket the time of impact, which is approached by regula falsi with
 Anderson and Bjoerck's weights (BIT 13, 1973), and by bisection where that lags, as between two gaps
-of which one is not straight. A joint's rate is known: the first length ends where the joint is at
-its limit at that rate, the next is along a parabola that begins with it. The loop that tries the
-lengths is step_control.step_to_impact(); in flight, flight/first_contact.py.
+of which one is not straight. The first length ends where a joint is at its limit at its rate; the
+second is along a parabola through the gap at the trial's middle, where the velocities are those of
+the start. The loop that tries the lengths is step_control.step_to_impact(); in flight,
+flight/first_contact.py.
 """
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.gaps import (EXCLUDED, SLOW, SLOW_TURN, TOUCHING, first_joint_limit_gap,
-                            is_joint_limit_gap)
+from ..contact.gaps import (EXCLUDED, SLOW, SLOW_TURN, first_joint_limit_gap,
+                            is_joint_limit_gap, one_gap)
 from ..system import System
 from ..workspace import Workspace
 
@@ -31,12 +32,12 @@ MAX_CHORDS = 2
 
 @compiled
 def is_fast_impact(s: System, ws: Workspace, j: int, h: float) -> bool:
-    """Whether gap j, open as the step of h s just taken began, is at most TOUCHING at its end, and
+    """Whether gap j, open as the step of h s just taken began, touches at its end, and
     closed at a mean rate above SLOW or SLOW_TURN.
     """
     slow = SLOW_TURN if is_joint_limit_gap(s, ws, j) else SLOW
-    end = ws.contacts.gaps_end[j]
-    return ws.gaps[j] > TOUCHING and end <= TOUCHING and ws.gaps[j] - end > slow * h
+    end, touching = ws.contacts.gaps_end[j], ws.step.scalars[0].touching
+    return ws.gaps[j] > touching and end <= touching and ws.gaps[j] - end > slow * h
 
 
 @compiled
@@ -47,7 +48,7 @@ def impacts_at_end(s: System, ws: Workspace, h: float) -> tuple[bool, bool, bool
     overshot = landed = fast = False
     for j in range(ws.gap_counts[0].live):
         quick, end = is_fast_impact(s, ws, j, h), ws.contacts.gaps_end[j]
-        if quick or (ws.step.gaps_high[j] < 0 and end <= TOUCHING):
+        if quick or (ws.step.gaps_high[j] < 0 and end <= ws.step.scalars[0].touching):
             fast |= quick
             landed = True
             overshot |= end < OVERSHOT
@@ -60,8 +61,9 @@ def open_bracket(ws: Workspace) -> None:
     bracket = ws.step.bracket[0]
     bracket.low, bracket.high, bracket.moved = 0.0, math.inf, 0
     bracket.halved_width, bracket.chords = math.inf, 0
+    aim = ws.step.scalars[0].touching / 2
     for j in range(ws.gap_counts[0].live):
-        ws.step.gaps_low[j], ws.step.gaps_high[j] = ws.gaps[j], EXCLUDED
+        ws.step.gaps_low[j], ws.step.gaps_high[j] = ws.gaps[j] - aim, EXCLUDED
 
 
 @compiled
@@ -69,15 +71,17 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
     """Make a step of h s the high end of the bracket, if something is ``overshot`` at its end, or
     its low end, unless something has ``landed``. Returns whether to try another length.
 
-    The gaps at an end that stays twice are weighted: anderson_bjorck_weight().
+    Gaps are kept less half of what touches, so that a trial a little long or short still ends at
+    the impact. Those at an end that stays twice are weighted: anderson_bjorck_weight().
     """
     bracket, low, high, end = (ws.step.bracket[0], ws.step.gaps_low, ws.step.gaps_high,
                                ws.contacts.gaps_end)
+    aim = ws.step.scalars[0].touching / 2
     if overshot:
         for j in range(ws.gap_counts[0].live):
             gap = EXCLUDED
             if end[j] < OVERSHOT and (high[j] < 0 or is_fast_impact(s, ws, j, h)):
-                gap = end[j]
+                gap = end[j] - aim
             if bracket.moved > 0:
                 low[j] *= anderson_bjorck_weight(high[j], gap)
             high[j] = gap
@@ -87,8 +91,8 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
         return False
     for j in range(ws.gap_counts[0].live):
         if bracket.moved < 0:
-            high[j] *= anderson_bjorck_weight(low[j], end[j])
-        low[j] = end[j]
+            high[j] *= anderson_bjorck_weight(low[j], end[j] - aim)
+        low[j] = end[j] - aim
     bracket.low, bracket.moved = h, -1
     return bracket.high < math.inf
 
@@ -103,12 +107,20 @@ def anderson_bjorck_weight(before: float, now: float) -> float:
 
 
 @compiled
-def next_trial_step(s: System, ws: Workspace, v: np.ndarray) -> float:
-    """Next step length to try, s: where the first of the bracketed gaps closes, by regula falsi or
-    bisection. ``v``: velocities at the start.
+def update_middle_gaps(s: System, ws: Workspace) -> None:
+    """Write to step.gaps_middle the bracketed gaps at the middle of the trial just made."""
+    for j in range(ws.gap_counts[0].live):
+        if ws.step.gaps_high[j] < 0:
+            ws.step.gaps_middle[j] = one_gap(s, ws, ws.step.middle, ws.step.q_middle, j)
+
+
+@compiled
+def next_trial_step(ws: Workspace) -> float:
+    """Next step length to try, s: where the first of the bracketed gaps is half of what touches, by
+    a parabola after the first trial, with step.gaps_middle, then by regula falsi or bisection.
     """
     bracket, high, share = ws.step.bracket[0], ws.step.gaps_high, 1.0
-    low, width = bracket.low, bracket.high - bracket.low
+    low, width, aim = bracket.low, bracket.high - bracket.low, ws.step.scalars[0].touching / 2
     first = bracket.halved_width == math.inf
     bracket.chords += 1
     late = bracket.chords > MAX_CHORDS
@@ -119,11 +131,11 @@ def next_trial_step(s: System, ws: Workspace, v: np.ndarray) -> float:
     for j in range(ws.gap_counts[0].live):
         if high[j] < 0:
             above = max(0.0, ws.step.gaps_low[j])
-            if not first or not is_joint_limit_gap(s, ws, j):
-                share = min(share, above / (above - high[j]))
+            if first and not math.isnan(ws.step.gaps_middle[j]):
+                slope = 2 * (ws.step.gaps_middle[j] - aim - above)
+                share = min(share, parabola_root(above, slope, high[j]))
             else:
-                share = min(share, parabola_root(
-                    above, limit_gap_rate(s, ws, v, j) * width, high[j]))
+                share = min(share, above / (above - high[j]))
     return max(SHORTEST, low + share * width)
 
 
@@ -152,6 +164,7 @@ def step_to_joint_limit(s: System, ws: Workspace, v: np.ndarray, h: float) -> fl
     first = first_joint_limit_gap(s, ws)
     for j in range(first, first + 2 * len(s.joint_limits)):
         rate = -limit_gap_rate(s, ws, v, j)
-        if rate > SLOW_TURN and ws.gaps[j] > TOUCHING and ws.gaps[j] < h * rate:
+        if rate > SLOW_TURN and ws.gaps[j] > ws.step.scalars[0].touching and (
+                ws.gaps[j] < h * rate):
             h = max(SHORTEST, ws.gaps[j] / rate)
     return h
