@@ -25,7 +25,7 @@ from .one_contact import project_to_disc
 
 ROUNDS, LOOSER = 6, 3
 """Rounds of sweeps, twice as many each time, and of Newton's method, against ten times the proximal
-share; the first LOOSER rounds that fail are followed by ten times the tolerance."""
+share; the first LOOSER rounds that fail are followed by ten times the tolerance, up to UNSOLVED."""
 
 RESTITUTION_ROUNDS, UNSOLVABLE = 1, 1e-2
 """Rounds for what meets within a step with restitution, and the residual, m/s, that they leave
@@ -81,7 +81,7 @@ def solve_cones(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, to
         left = newton(island, m, n, b, p, tolerance, proximal)
         project_to_cones(island.members, m, p)
         if turn < LOOSER:
-            tolerance *= 10
+            tolerance = max(tolerance, min(10 * tolerance, UNSOLVED))
         if left <= tolerance:
             return left, done
         sweeps, proximal = 2 * sweeps, 10 * proximal

@@ -36,8 +36,8 @@ from .springs import add_implicit_stiffness, add_spring_force, saturate_springs,
 from .warm_start import warm_start
 from .work import account_kinematic_work, account_work, load_potential
 
-STEP_TOLERANCE = 1e-8
-"""m/s to which contacts are solved."""
+SOLVED_SPEED = 1e-3
+"""m/s: contacts of small islands are solved to this times solve_error, see physics/accuracy.py."""
 
 MAX_PENETRATION = 5e-4
 """m by which a step may penetrate the ground or a body."""
@@ -113,7 +113,8 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
                 update_velocities(s.tree, step.q_middle, step.v_middle, kin)
                 if not set_slip_friction(s, ws, kin, step.q_middle, m, h):
                     break
-            solve_contacts(s, ws, kin, step.q_middle, v, step.v_free, m, h, STEP_TOLERANCE)
+            solve_contacts(s, ws, kin, step.q_middle, v, step.v_free, m, h,
+                           SOLVED_SPEED * step.scalars[0].solve_error)
             for j in range(len(v)):
                 step.v_end[j] = step.v_free[j] + step.v_change[j]
     else:

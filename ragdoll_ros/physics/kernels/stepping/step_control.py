@@ -16,7 +16,7 @@ from ..contact.point_gaps import has_point_gaps, update_point_gaps
 from ..dynamics.kinematics import integrate_positions
 from ..system import System
 from ..workspace import Workspace
-from .contact_step import MAX_PENETRATION, STEP_TOLERANCE, contact_step, finish_step
+from .contact_step import MAX_PENETRATION, SOLVED_SPEED, contact_step, finish_step
 from .impact_log import log_impacts
 from .momentum import (REMOVABLE, count_contact_impulses, internal_kinetic_energy, remove_energy,
                        total_energy)
@@ -269,7 +269,8 @@ def solver_energy(s: System, ws: Workspace, m: int, h: float) -> float:
     for i in range(m):
         for e in range(ws.contacts.found[i].kind):
             total += abs(ws.contacts.found[i].impulse[e])
-    return max(10 * STEP_TOLERANCE, ws.step.scalars[0].residual) * min(
+    scalars = ws.step.scalars[0]
+    return max(10 * SOLVED_SPEED * scalars.solve_error, scalars.residual) * min(
         total, jam_threshold(s, ws, h))
 
 
