@@ -81,13 +81,10 @@ def write_ground_contact(s: System, kin: Kinematics, k: int, point: int, normal:
     geom = s.geoms[k]
     c.kind = ROLLING if law.rolling_friction > 0 else FRICTIONAL
     c.body_a, c.body_b = geom.body, WORLD
-    put(c.point, ground_point(s, geom, point, kin.geom_positions[k], kin.geom_rotations[k],
-                              normal))
+    lowest = ground_point(s, geom, point, kin.geom_positions[k], kin.geom_rotations[k], normal)
+    c.gap = dot(lowest, normal) - offset
+    put(c.point, add_scaled(lowest, -c.gap / 2, normal))
     put(c.normal, normal)
-    high = -offset
-    for e in range(3):
-        high += c.point[e] * c.normal[e]
-    c.gap = high
     c.friction, c.rolling_friction = law.friction, law.rolling_friction
     c.restitution = law.restitution
 

@@ -21,7 +21,7 @@ from ..workspace import Contacts, Workspace
 from .internal_edges import FLUSH, is_at_internal_edge
 from .placed_shape import placed_shape
 
-MET = 1e-7
+MET = 5e-7
 """m or rad: geoms that are farther apart than this have no part in an impact, unless they approach
 or were nearer in the last step: balls that almost touch hit one after the other."""
 
@@ -343,7 +343,7 @@ def is_joint_limit_gap(s: System, ws: Workspace, j: int) -> bool:
 
 @compiled
 def one_gap(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, j: int) -> float:
-    """Gap j at q; ``kin``: of q, with its geoms. Not a number for those of points of a pair."""
+    """Gap j, of those without points of pairs, at q; ``kin``: of q, with its geoms."""
     n, first = 0, first_joint_limit_gap(s, ws)
     for k in range(len(s.geoms)):
         if n <= j < n + s.geoms[k].point_count:
@@ -355,8 +355,6 @@ def one_gap(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, j: int) ->
         limit = s.joint_limits[(j - first) // 2]
         return limit.upper - q[limit.q] if (j - first) % 2 else q[limit.q] - limit.lower
     k = j - (ws.gap_counts[0].fixed - len(s.pairs))
-    if k >= len(s.pairs):
-        return math.nan
     pair = s.pairs[k]
     if s.geoms[pair.b].kind == PLANE:
         normal, offset = plane_of(kin, pair.b)

@@ -17,7 +17,7 @@ from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import add, dot, sub, to_local, to_world, vec
 from ..system import MAX_MANIFOLD_POINTS, System
 from ..workspace import Workspace
-from .gaps import EXCLUDED, FAR, NONE, SLOW, pair_gap, past_internal_edges
+from .gaps import EXCLUDED, FAR, NONE, SLOW, one_gap, pair_gap, past_internal_edges
 from .jacobian import normal_velocity
 from .placed_shape import placed_shape
 
@@ -88,27 +88,38 @@ def add_point(s: System, ws: Workspace, kin: Kinematics, k: int, at: np.record, 
     if j == len(ws.gaps):
         return NONE
     contacts.points[i], contacts.point_pair[i] = at, k
-    ws.gaps[j] = contacts.gaps_active[j] = gap_at_start(s, ws, kin, k, at)
-    ws.step.gaps_low[j] = (ws.gaps[j] + (at.gap - ws.gaps[j]) * ws.step.bracket[0].low / h
-                           - ws.step.scalars[0].touching / 2)
+    ws.gaps[j] = contacts.gaps_active[j] = moved_gap(s, kin, ws.step.start, k, at)
+    ws.step.gaps_low[j] = ws.gaps[j] + (at.gap - ws.gaps[j]) * ws.step.bracket[0].low / h
     ws.step.gaps_high[j] = EXCLUDED
     counts.live += 1
     return i
 
 
 @compiled
-def gap_at_start(s: System, ws: Workspace, kin: Kinematics, k: int, at: np.record) -> float:
-    """Gap, m, at the start of the step between the points of both geoms of pair k that meet ``at``
-    the end of it. ``kin``: of the end, with its geoms.
+def moved_gap(s: System, kin: Kinematics, to: Kinematics, k: int, at: np.record) -> float:
+    """Gap, m, in ``to`` between the points of both geoms of pair k that are ``at`` a point of its
+    manifold in ``kin``. Both have their geoms.
     """
-    start, a, b = ws.step.start, s.pairs[k].a, s.pairs[k].b
-    r, r_start = kin.geom_rotations[b], start.geom_rotations[b]
-    normal = to_world(r_start, to_local(r, vec(at.normal)))
-    on_b = to_world(r_start, to_local(r, sub(vec(at.point), vec(kin.geom_positions[b]))))
-    r, r_start = kin.geom_rotations[a], start.geom_rotations[a]
-    on_a = to_world(r_start, to_local(r, sub(vec(at.point), vec(kin.geom_positions[a]))))
-    apart = sub(add(on_a, vec(start.geom_positions[a])), add(on_b, vec(start.geom_positions[b])))
+    a, b = s.pairs[k].a, s.pairs[k].b
+    r, r_to = kin.geom_rotations[b], to.geom_rotations[b]
+    normal = to_world(r_to, to_local(r, vec(at.normal)))
+    on_b = to_world(r_to, to_local(r, sub(vec(at.point), vec(kin.geom_positions[b]))))
+    r, r_to = kin.geom_rotations[a], to.geom_rotations[a]
+    on_a = to_world(r_to, to_local(r, sub(vec(at.point), vec(kin.geom_positions[a]))))
+    apart = sub(add(on_a, vec(to.geom_positions[a])), add(on_b, vec(to.geom_positions[b])))
     return at.gap + dot(normal, apart)
+
+
+@compiled
+def middle_gap(s: System, ws: Workspace, j: int) -> float:
+    """Gap j at the middle of the trial just made; of a point of a pair that between the points of
+    both bodies that are there at the step's start, or, if it was added then, at the trial's end.
+    """
+    i = j - ws.gap_counts[0].fixed
+    if i < 0:
+        return one_gap(s, ws, ws.step.middle, ws.step.q_middle, j)
+    kin = ws.step.start if i < ws.step.scalars[0].start_point_count else ws.step.end
+    return moved_gap(s, kin, ws.step.middle, ws.contacts.point_pair[i], ws.contacts.points[i])
 
 
 @compiled

@@ -16,12 +16,17 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact.gaps import (EXCLUDED, SLOW, SLOW_TURN, first_joint_limit_gap,
-                            is_joint_limit_gap, one_gap)
+                            is_joint_limit_gap)
+from ..contact.point_gaps import middle_gap
 from ..system import System
 from ..workspace import Workspace
 
 OVERSHOT = -1e-7
 """m or rad: a gap that is less at a step's end has closed on the way."""
+
+LANDED, AIM = 1e-6, 2e-7
+"""m or rad: a gap that closes fast is sought until it is between OVERSHOT and the first; trials are
+to end at the second, so that those a little long or short end there as well."""
 
 SHORTEST = 1e-9
 """s: no step is made shorter to find an impact."""
@@ -43,14 +48,14 @@ def is_fast_impact(s: System, ws: Workspace, j: int, h: float) -> bool:
 @compiled
 def impacts_at_end(s: System, ws: Workspace, h: float) -> tuple[bool, bool, bool]:
     """Of the gaps that closed fast in the step of h s just taken, or whose time of impact is
-    sought: whether one is overshot at its end; whether there is any; whether any closed fast.
+    sought: whether one is overshot at its end; whether one has landed; whether any closed fast.
     """
     overshot = landed = fast = False
     for j in range(ws.gap_counts[0].live):
         quick, end = is_fast_impact(s, ws, j, h), ws.contacts.gaps_end[j]
+        fast |= quick
         if quick or (ws.step.gaps_high[j] < 0 and end <= ws.step.scalars[0].touching):
-            fast |= quick
-            landed = True
+            landed |= end <= LANDED or not quick
             overshot |= end < OVERSHOT
     return overshot, landed, fast
 
@@ -61,9 +66,8 @@ def open_bracket(ws: Workspace) -> None:
     bracket = ws.step.bracket[0]
     bracket.low, bracket.high, bracket.moved = 0.0, math.inf, 0
     bracket.halved_width, bracket.chords = math.inf, 0
-    aim = ws.step.scalars[0].touching / 2
     for j in range(ws.gap_counts[0].live):
-        ws.step.gaps_low[j], ws.step.gaps_high[j] = ws.gaps[j] - aim, EXCLUDED
+        ws.step.gaps_low[j], ws.step.gaps_high[j] = ws.gaps[j] - AIM, EXCLUDED
 
 
 @compiled
@@ -71,17 +75,16 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
     """Make a step of h s the high end of the bracket, if something is ``overshot`` at its end, or
     its low end, unless something has ``landed``. Returns whether to try another length.
 
-    Gaps are kept less half of what touches, so that a trial a little long or short still ends at
-    the impact. Those at an end that stays twice are weighted: anderson_bjorck_weight().
+    Gaps are kept less AIM; those at an end that stays twice are weighted:
+    anderson_bjorck_weight().
     """
     bracket, low, high, end = (ws.step.bracket[0], ws.step.gaps_low, ws.step.gaps_high,
                                ws.contacts.gaps_end)
-    aim = ws.step.scalars[0].touching / 2
     if overshot:
         for j in range(ws.gap_counts[0].live):
             gap = EXCLUDED
             if end[j] < OVERSHOT and (high[j] < 0 or is_fast_impact(s, ws, j, h)):
-                gap = end[j] - aim
+                gap = end[j] - AIM
             if bracket.moved > 0:
                 low[j] *= anderson_bjorck_weight(high[j], gap)
             high[j] = gap
@@ -91,8 +94,8 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
         return False
     for j in range(ws.gap_counts[0].live):
         if bracket.moved < 0:
-            high[j] *= anderson_bjorck_weight(low[j], end[j] - aim)
-        low[j] = end[j] - aim
+            high[j] *= anderson_bjorck_weight(low[j], end[j] - AIM)
+        low[j] = end[j] - AIM
     bracket.low, bracket.moved = h, -1
     return bracket.high < math.inf
 
@@ -111,16 +114,16 @@ def update_middle_gaps(s: System, ws: Workspace) -> None:
     """Write to step.gaps_middle the bracketed gaps at the middle of the trial just made."""
     for j in range(ws.gap_counts[0].live):
         if ws.step.gaps_high[j] < 0:
-            ws.step.gaps_middle[j] = one_gap(s, ws, ws.step.middle, ws.step.q_middle, j)
+            ws.step.gaps_middle[j] = middle_gap(s, ws, j)
 
 
 @compiled
 def next_trial_step(ws: Workspace) -> float:
-    """Next step length to try, s: where the first of the bracketed gaps is half of what touches, by
-    a parabola after the first trial, with step.gaps_middle, then by regula falsi or bisection.
+    """Next step length to try, s: where the first of the bracketed gaps is AIM, by a parabola
+    after the first trial, with step.gaps_middle, then by regula falsi or bisection.
     """
     bracket, high, share = ws.step.bracket[0], ws.step.gaps_high, 1.0
-    low, width, aim = bracket.low, bracket.high - bracket.low, ws.step.scalars[0].touching / 2
+    low, width = bracket.low, bracket.high - bracket.low
     first = bracket.halved_width == math.inf
     bracket.chords += 1
     late = bracket.chords > MAX_CHORDS
@@ -131,8 +134,8 @@ def next_trial_step(ws: Workspace) -> float:
     for j in range(ws.gap_counts[0].live):
         if high[j] < 0:
             above = max(0.0, ws.step.gaps_low[j])
-            if first and not math.isnan(ws.step.gaps_middle[j]):
-                slope = 2 * (ws.step.gaps_middle[j] - aim - above)
+            if first:
+                slope = 2 * (ws.step.gaps_middle[j] - AIM - above)
                 share = min(share, parabola_root(above, slope, high[j]))
             else:
                 share = min(share, above / (above - high[j]))
