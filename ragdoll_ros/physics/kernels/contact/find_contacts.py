@@ -81,10 +81,10 @@ def write_ground_contact(s: System, kin: Kinematics, k: int, point: int, normal:
     geom = s.geoms[k]
     c.kind = ROLLING if law.rolling_friction > 0 else FRICTIONAL
     c.body_a, c.body_b = geom.body, WORLD
-    lowest = ground_point(s, geom, point, kin.geom_positions[k], kin.geom_rotations[k], normal)
-    c.gap = dot(lowest, normal) - offset
-    put(c.point, add_scaled(lowest, -c.gap / 2, normal))
+    put(c.point, ground_point(s, geom, point, kin.geom_positions[k], kin.geom_rotations[k],
+                              normal))
     put(c.normal, normal)
+    c.gap = dot(vec(c.point), normal) - offset
     c.friction, c.rolling_friction = law.friction, law.rolling_friction
     c.restitution = law.restitution
 

@@ -136,9 +136,12 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
     acceleration, relative = acceleration_bounds(s, ws, cluster)
     set_contact_gaps(ws)
     time = before = 0.0
-    for _ in range(MAX_SAMPLES):
+    for k in range(MAX_SAMPLES):
         evaluate_dense_step(s.tree, cluster, time, q, v)
-        update_kinematics_and_gaps(s, ws, kin, q, v, gaps, math.inf, gaps)
+        gone = time - before if k else math.inf
+        if k:
+            lower_pair_gaps(s, ws, gaps, 2 * acceleration * gone * gone)
+        update_kinematics_and_gaps(s, ws, kin, q, v, gaps, gone, gaps)
         least = least_gap(ws, gaps)
         if least < -CLOSED:
             step.event_time = regula_falsi(s, ws, cluster, before, time)
@@ -157,6 +160,14 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
             time = step.length
     step.event_time = before
     ws.stats[0].toi_failures += 1
+
+
+@compiled
+def lower_pair_gaps(s: System, ws: Workspace, gaps: np.ndarray, distance: float) -> None:
+    """Lower the gaps of pairs by a ``distance``, m, by which accelerations may have closed them."""
+    fixed = ws.gap_counts[0].fixed
+    for j in range(fixed - len(s.pairs), fixed):
+        gaps[j] -= distance
 
 
 @compiled
