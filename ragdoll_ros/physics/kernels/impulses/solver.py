@@ -24,7 +24,7 @@ from .newton import newton
 from .one_contact import project_to_disc
 
 ROUNDS, LOOSER = 6, 3
-"""Rounds of sweeps, twice as many each time, and of Newton's method, against ten times the proximal
+"""Rounds of sweeps, twice as many each time, and of Newton's method, against more of the proximal
 share; the first LOOSER rounds that fail are followed by ten times the tolerance, up to UNSOLVED."""
 
 RESTITUTION_ROUNDS, UNSOLVABLE = 1, 1e-2
@@ -35,9 +35,10 @@ there."""
 SWEEPS = 2
 """Gauss-Seidel sweeps before the first Newton step: three and eight cost more than they save."""
 
-PROXIMAL = 1e-5
+PROXIMAL, STIFFER = 1e-4, 3
 """Share of W's diagonal that resists the first round's Newton steps: enough for impulses that the
-compliance, 1e-8 of W, decides, and far less than what decides the motion of bodies."""
+compliance, 1e-8 of W, decides, and less than what decides the motion of bodies; and its growth from
+round to round. With 1e-5, as with 1e-3, more steps are taken."""
 
 UNSOLVED = 1e-5
 """m/s: islands with a larger residual are counted, and their impulses kept from adding energy."""
@@ -84,7 +85,7 @@ def solve_cones(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, to
             tolerance = max(tolerance, min(10 * tolerance, UNSOLVED))
         if left <= tolerance:
             return left, done
-        sweeps, proximal = 2 * sweeps, 10 * proximal
+        sweeps, proximal = 2 * sweeps, STIFFER * proximal
     return left, done
 
 
