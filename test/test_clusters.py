@@ -172,7 +172,8 @@ def test_each_doll_sleeps_and_wakes_by_itself():
     """
     crowd = field(4)
     falling = [dataclasses.replace(doll, spin=(0.4, 0.3, 0.0)) for doll in crowd.dolls]
-    high = dataclasses.replace(falling[3], position=(APART, 0.0, 3.0))
+    # above where the second lies then: it falls to its right
+    high = dataclasses.replace(falling[3], position=(APART, -0.4, 3.0))
     far = dataclasses.replace(falling[2], position=(10.0, 0.0, 0.0))  # whatever falls on the second
     crowd = dataclasses.replace(crowd, dolls=(*falling[:2], far, high))
     first, second, third, above = crowd.bone_slices

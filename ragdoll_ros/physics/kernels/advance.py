@@ -57,6 +57,7 @@ from .stepping.contact_step import approaches_fast, begin_contact_step
 from .stepping.impact import follow_twist, impact
 from .stepping.momentum import sum_dolls
 from .stepping.step_control import step_to_impact
+from .stepping.time_of_impact import LANDED
 from .system import System, system_at
 from .workspace import WORKSPACE, Workspace
 
@@ -198,7 +199,8 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         impact_due = True
         if touched:
             since = cycles()
-            impact_due = impact(s, ws, cluster, time) > 0
+            landed = LANDED if gone > 0.0 else math.inf
+            impact_due = impact(s, ws, cluster, time, landed) > 0
             impacts += 1
             ledger.impact_cycles += cycles() - since
     write_bone_states(s, ws.step.end, q, v, cluster.bone_states)

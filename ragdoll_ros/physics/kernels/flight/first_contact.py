@@ -135,6 +135,7 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
     q, v, kin = flight.q, flight.v, flight.kinematics
     acceleration, relative = acceleration_bounds(s, ws, cluster)
     set_contact_gaps(ws)
+    clear_corrections(ws.contacts.motion)
     time = before = 0.0
     for k in range(MAX_SAMPLES):
         evaluate_dense_step(s.tree, cluster, time, q, v)
@@ -160,6 +161,13 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
             time = step.length
     step.event_time = before
     ws.stats[0].toi_failures += 1
+
+
+@compiled
+def clear_corrections(motion: np.ndarray) -> None:
+    """Set the displacements by position correction (n,) to zero: in flight there is none."""
+    for i in range(len(motion)):
+        motion[i].correction = motion[i].correction_angle = 0.0
 
 
 @compiled

@@ -1,6 +1,8 @@
 """An impact: Newton's law of restitution and Coulomb's law of friction at an instant."""
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..cluster_state import ClusterState
@@ -31,15 +33,16 @@ def is_approaching(c: np.record) -> bool:
 
 
 @compiled
-def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m: int) -> int:
-    """Drop those of m contacts found at cluster.q that take no part in an impact, see MET. Returns
-    how many are kept.
+def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m: int,
+             landed: float) -> int:
+    """Drop those of m contacts found at cluster.q that take no part in an impact, see MET; what
+    approaches does below the gap ``landed``, m or rad. Returns how many are kept.
     """
     contacts, known, count = ws.contacts.found, ws.stats[0].contact_count, 0
     for i in range(m):
         if contacts[i].gap > MET:
             contact_velocities(s, kin, cluster.q, cluster.v, contacts[i])
-            if not is_approaching(contacts[i]) and not (
+            if not (contacts[i].gap <= landed and is_approaching(contacts[i])) and not (
                     had_met(s, cluster.contacts, known, contacts[i].id)):
                 continue
         contacts[count] = contacts[i]
@@ -54,15 +57,15 @@ def follow_twist(s: System, ws: Workspace, cluster: ClusterState) -> None:
     ws.gaps are current.
     """
     if ws.stats[0].twist_changed:
-        impact(s, ws, cluster, 0.0)
+        impact(s, ws, cluster, 0.0, math.inf)
         ws.stats[0].twist_changed = 0
 
 
 @compiled
-def impact(s: System, ws: Workspace, cluster: ClusterState, time: float) -> int:
+def impact(s: System, ws: Workspace, cluster: ClusterState, time: float, landed: float) -> int:
     """Add to cluster.v the change by the impulses of everything that has met at q by ws.gaps, and
     log what met, ``time`` s after the beginning of the advance, where a log is kept. Returns how
-    many contacts that touch were left out.
+    many contacts that touch were left out. ``landed``: see keep_met().
     """
     q, v, kin, dyn, contacts = (cluster.q, cluster.v, ws.step.start, ws.step.dynamics,
                                 ws.contacts.found)
@@ -70,9 +73,9 @@ def impact(s: System, ws: Workspace, cluster: ClusterState, time: float) -> int:
     forward_kinematics(s.tree, q, v, kin)
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     touching = find_contacts(s, ws, kin, q, ws.gaps, 0.0)
-    m = keep_met(s, ws, cluster, kin, touching)
+    m = keep_met(s, ws, cluster, kin, touching, landed)
     if m == 0:
-        return 0
+        return touching
     root_motion_subspaces(s.tree, q, kin)
     rotate_inertias(s.tree, kin, dyn.matrix)
     mass_matrix(s.tree, s.dof_parent, s.dof_body, kin, dyn)
