@@ -1,6 +1,7 @@
 """Fainting falls of the report: their start, that they repeat, that data sets of falls measure the
 same, and their table.
 """
+import dataclasses
 import math
 
 import numpy as np
@@ -78,13 +79,17 @@ def test_the_table_tells_means_in_the_real_ones_deviations():
     assert '| head | 0.50 | 0.35 |' in text
 
 
-CHAOTIC = 2
-"""Number of a fall in which moving the start by 1e-14 m changes velocities by 1e-3 m/s at .96 s."""
+def _moved(start):
+    """The start, moved by 1e-14 m along the ground."""
+    doll = start.scene.dolls[0]
+    doll = dataclasses.replace(doll, position=tuple(np.add(doll.position, (1e-14, 1e-14, 0))))
+    return dataclasses.replace(start, scene=dataclasses.replace(start.scene, dolls=(doll,)))
 
 
 def test_a_data_set_of_falls_measures_the_same_as_the_report():
     made = recipe(who={'people': [{'sex': 'female', 'height': 1.6, 'bmi': 22}]}, duration=DURATION,
                   feet=list(FEET), record={'rate': 100})
+    steady = 0
     for number in range(4):
         start = fainting_start(number)
         doll = start.scene.dolls[0].doll
@@ -106,7 +111,9 @@ def test_a_data_set_of_falls_measures_the_same_as_the_report():
             _, speed = part_impact(part, start.scene.bone_names, frames, -velocities[:, 2])
             assert summary.speeds_of(part) == pytest.approx(
                 [value for value in [float(speed)] if not math.isnan(value)], abs=1e-12)
-        # Positions differ by rounding at the start, which impacts amplify: in CHAOTIC by 1e11 until
-        # the pelvis hits, in others by 1e7, and from then on in all.
-        if number != CHAOTIC:
+        # Positions differ by rounding at the start, which impacts amplify, in some falls by 1e11 until
+        # the pelvis hits: those say nothing here. Of the others there are two at least.
+        if abs(fall_values(_moved(start))['pelvis'] - expected['pelvis']) < 1e-4:
+            steady += 1
             assert summary.speeds_of('pelvis') == pytest.approx([expected['pelvis']], abs=1e-3)
+    assert steady >= 2
