@@ -111,8 +111,8 @@ def test_a_data_set_of_falls_measures_the_same_as_the_report():
             _, speed = part_impact(part, start.scene.bone_names, frames, -velocities[:, 2])
             assert summary.speeds_of(part) == pytest.approx(
                 [value for value in [float(speed)] if not math.isnan(value)], abs=1e-12)
-        # Positions differ by rounding at the start, which impacts amplify, in some falls by 1e11 until
-        # the pelvis hits: those say nothing here. Of the others there are two at least.
+        # Positions differ by rounding at the start, which impacts amplify, in some falls by 1e11
+        # until the pelvis hits: those say nothing here. Of the others there are two at least.
         if abs(fall_values(_moved(start))['pelvis'] - expected['pelvis']) < 1e-4:
             steady += 1
             assert summary.speeds_of('pelvis') == pytest.approx([expected['pelvis']], abs=1e-3)
