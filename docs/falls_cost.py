@@ -148,7 +148,8 @@ def main() -> None:
         recipe = recipe_of({**given.data, 'accuracy': accuracy, 'limp': []})
         _print(f'{accuracy}, limp from the start', parts_of(recipe, options.falls, clock),
                f'{mujocos(recipe, options.falls, accuracy, 1):.1f}')
-    formats_of(given, options.falls)
+    if given.data['record']['imus']:  # some formats are those of a sensor
+        formats_of(given, options.falls)
 
 
 def _print(label: str, parts: list[float], theirs: str) -> None:
