@@ -18,9 +18,9 @@ from .widgets import parsing
 from .widgets.error_text import error_text
 from .widgets.form import GREY, RED, Field, Form, colored
 
-ERRORS_MM = {'rigid': {'draft': 0.5, 'normal': 0.29, 'exact': 0.03},
+ERRORS_MM = {'rigid': {'draft': 0.46, 'normal': 0.27, 'exact': 0.03},
              'bullet': {'draft': 7, 'normal': 5, 'exact': 4},
-             'mujoco': {'draft': 11, 'normal': 8, 'exact': 8}}
+             'mujoco': {'draft': 11, 'normal': 8, 'exact': 7}}
 """Position error of the default doll's bones after 0.1 s of contacts, median of 240 segments, for
 each engine: docs/accuracy.md, 'pieces'. `exact` of PyBullet and MuJoCo is that of 32 substeps."""
 
