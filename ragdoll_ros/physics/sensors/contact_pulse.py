@@ -21,7 +21,7 @@ from ...model.scene import SECOND, Scene
 from .impacts import Impact
 
 TINY = 1e-12
-"""s or N s: nothing, but it can be divided by."""
+"""s or N s: keeps a division from being by zero."""
 
 
 class PulseLaw:
@@ -74,8 +74,8 @@ class PulseLog:
     def add(self, impacts: Iterable[Impact]) -> None:
         """Add the impacts of a tick.
 
-        An impulse beyond 2 mu v, all that a spring gives, does not count: the body hands it on from
-        other impacts and stops at the same time, and it lasts as long as they do.
+        Of an impulse at most 2 mu v counts, the most that a spring gives. The rest is transmitted
+        through the body from other impacts and stops of that sample, and lasts as long as they do.
         """
         for impact in impacts:
             if duration := self._law.duration(impact):

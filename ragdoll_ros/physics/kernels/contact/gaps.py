@@ -128,16 +128,23 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
 
 
 @compiled
+def clear_corrections(motion: np.ndarray) -> None:
+    """Set the displacements by position correction (n,) to zero."""
+    for i in range(len(motion)):
+        motion[i].correction = motion[i].correction_angle = 0.0
+
+
+@compiled
 def label_reachable(s: System, ws: Workspace, kin: Kinematics, gaps: np.ndarray, h: float,
                     label: np.ndarray) -> None:
     """Write to ``label`` (d,) which dolls may meet within h s, directly or by others: the least
     index of all that may. Speeds count MOST_SPEEDUP times. ``kin``, ``gaps``: current.
     """
     motion = ws.contacts.motion
+    clear_corrections(motion)
     for i in range(len(s.tree)):
         velocity, motion[i].angular_speed = body_velocity(kin, i)
         motion[i].speed = norm(velocity)
-        motion[i].correction = motion[i].correction_angle = 0.0
     for d in range(len(label)):
         label[d] = d
     first = ws.gap_counts[0].fixed - len(s.pairs)

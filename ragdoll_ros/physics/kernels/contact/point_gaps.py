@@ -131,11 +131,11 @@ def approach_speed(s: System, kin: Kinematics, q: np.ndarray, k: int, at: np.rec
 
 
 @compiled
-def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, h: float,
+def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, h: float,
                       out: np.ndarray) -> None:
-    """Write the gaps of pairs that touched as the step began, and of their points, at q, the end of
-    a trial of h s, to ``out``; after update_gaps(). Points that are not found are farther than FAR,
-    and at internal edges none counts. ``kin``: of q and the velocities at the end.
+    """Write the gaps of pairs that touched as the step began, and of their points, at the end of a
+    trial of h s, to ``out``; after update_gaps(). Points that are not found are farther than FAR,
+    and at internal edges none counts. ``kin``: of the end, with its geoms.
     """
     counts, contacts = ws.gap_counts[0], ws.contacts
     first = counts.fixed - len(s.pairs)

@@ -9,7 +9,7 @@ from ..cluster_state import ClusterState
 from ..collision.narrow_phase import collide
 from ..collision.shapes import PLANE
 from ..compiling.decorators import compiled
-from ..contact.gaps import (FAR, NEAR, ground_point, plane_of,
+from ..contact.gaps import (FAR, NEAR, clear_corrections, ground_point, plane_of,
                             update_kinematics_and_gaps)
 from ..contact.jacobian import normal_velocity
 from ..contact.placed_shape import placed_shape
@@ -161,13 +161,6 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
             time = step.length
     step.event_time = before
     ws.stats[0].toi_failures += 1
-
-
-@compiled
-def clear_corrections(motion: np.ndarray) -> None:
-    """Set the displacements by position correction (n,) to zero: in flight there is none."""
-    for i in range(len(motion)):
-        motion[i].correction = motion[i].correction_angle = 0.0
 
 
 @compiled

@@ -240,7 +240,7 @@ def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since
         conserve_momentum(s, ws, h, q, v)
     write_correction_bounds(s, kin, q, step.correction, ws.contacts.motion)
     update_kinematics_and_gaps(s, ws, kin, q, v, ws.gaps, h, ws.contacts.gaps_end)
-    update_point_gaps(s, ws, kin, q, h, ws.contacts.gaps_end)
+    update_point_gaps(s, ws, kin, h, ws.contacts.gaps_end)
     sum_dolls(s, ws, kin, q, step.sums_after)
     ws.stats[0].work_pushes += (load_potential(s, kin, q, cluster.loads)
                                 - step.scalars[0].start_load_potential)

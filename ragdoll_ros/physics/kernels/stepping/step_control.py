@@ -173,7 +173,7 @@ def predict_contacts(s: System, ws: Workspace, cluster: ClusterState, h: float,
     step, q, v = ws.step, cluster.q, cluster.v
     integrate_positions(s.tree, q, v, h, step.q_end)
     update_kinematics_and_gaps(s, ws, step.end, step.q_end, v, ws.gaps, h, ws.contacts.gaps_end)
-    update_point_gaps(s, ws, step.end, step.q_end, h, ws.contacts.gaps_end)
+    update_point_gaps(s, ws, step.end, h, ws.contacts.gaps_end)
     return unseen_share(s, ws, UNSEEN_SPEED * nominal)
 
 
