@@ -13,7 +13,7 @@ class Accuracy:
     """Step sizes and tolerances of the engines."""
 
     step: float
-    """s: longest step of the rigid engine during contact."""
+    """s: nominal step of the rigid engine in contact; what moves slowly takes longer ones."""
     flight_error: float
     """m or rad: local error tolerance of the rigid engine's integrator without contact."""
     substeps: float

@@ -55,6 +55,7 @@ from .flight.flight import can_fly, follow_dense_step
 from .maths.vectors import add, put, vec
 from .stepping.contact_step import approaches_fast, begin_contact_step
 from .stepping.impact import follow_twist, impact
+from .stepping.local_error import forget_accelerations
 from .stepping.momentum import sum_dolls
 from .stepping.step_control import step_to_impact
 from .stepping.time_of_impact import LANDED
@@ -186,7 +187,8 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         else:
             if not flight_possible or not seek:
                 refresh_gaps(s, ws, cluster)
-            h = left / max(1, math.ceil(left / nominal - 1e-9))
+            longest = max(nominal, stats.smooth_dt)
+            h = left / max(1, math.ceil(left / longest - 1e-9))
             since = cycles()
             begin_contact_step(s, ws, cluster)
             ledger.begin_cycles += cycles() - since
@@ -203,6 +205,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
             impact_due = impact(s, ws, cluster, time, landed) > 0
             impacts += 1
             ledger.impact_cycles += cycles() - since
+            forget_accelerations(cluster)
     write_bone_states(s, ws.step.end, q, v, cluster.bone_states)
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)
     ledger.all_cycles += cycles() - start_cycles

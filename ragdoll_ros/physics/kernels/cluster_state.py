@@ -57,24 +57,27 @@ or rad, that was found of late for each second of a step, 0: none."""
 
 LEDGER = np.dtype([
     *((name, np.int64) for name in (
-        'trials', 'too_much_energy', 'too_deep', 'closed_unseen', 'new_contacts', 'past_impact',
-        'solves', 'contacts', 'rows', 'dofs', 'newton_steps', 'gap_updates', 'narrow_phases')),
+        'trials', 'too_much_energy', 'too_deep', 'too_coarse', 'closed_unseen', 'new_contacts',
+        'past_impact', 'solves', 'contacts', 'rows', 'dofs', 'newton_steps', 'gap_updates',
+        'narrow_phases')),
     *((name, np.int64) for name in (
         'gaps_cycles', 'flight_cycles', 'begin_cycles', 'dynamics_cycles', 'find_cycles',
         'solve_cycles', 'finish_cycles', 'impact_cycles', 'all_cycles'))], align=True)
 """What a cluster's steps are made of, since the start. Trials of contact steps, and those that were
-rejected: for the energy that they added, for penetration, for what closed faster than is allowed
-where impacts are not sought, for contacts that they had not known, to end at an impact. Islands
-that were solved, with their contacts, rows, and degrees of freedom of their dolls; Newton steps.
-Times that all gaps were found, and pairs of which that took a narrow phase. Cycles of the processor
-in: finding gaps outside of steps, flight, the beginning of steps, motion without contacts, finding
-contacts, their solve, the end of steps with its gaps, impacts, and all."""
+rejected: for the energy that they added, for penetration, for the local error of a step longer than
+the nominal one, for what closed faster than is allowed where impacts are not sought, for contacts
+that they had not known, to end at an impact. Islands that were solved, with their contacts, rows,
+and degrees of freedom of their dolls; Newton steps. Times that all gaps were found, and pairs of
+which that took a narrow phase. Cycles of the processor in: finding gaps outside of steps, flight,
+the beginning of steps, motion without contacts, finding contacts, their solve, the end of steps
+with its gaps, impacts, and all."""
 
 STEP_STATS = np.dtype([
     ('flight_steps', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
     ('unsolved', np.int64), ('contacts_dropped', np.int64), ('toi_failures', np.int64),
     ('restitution_reduced', np.int64), ('energy_gains', np.int64), ('contact_count', np.int64),
     ('ended_without_impact', np.int64), ('last_dt', float), ('next_dt', float),
+    ('smooth_dt', float), ('acceleration_dt', float),
     ('work_pushes', float), ('work_grabs', float), ('work_position_correction', float),
     ('energy_removed', float), ('energy_unremoved', float), ('gaps_current', np.int64),
     ('twist_changed', np.int64), ('flights_cut', np.int64), ('ledger', LEDGER)], align=True)
@@ -82,22 +85,25 @@ STEP_STATS = np.dtype([
 unsolved, contacts dropped for want of space, searches for a time of impact that failed, impacts
 whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last
 step: its contacts, whether it ended without an impact, its length and the longest that the next may
-have, s (0: any). Work of pushes, of grabs, and of position correction beyond its share of the
-kinetic energy, J. Spurious energy gained in steps, J: removed from the motion, and left, where
-nothing moved. ``gaps_current``: whether the gaps are those at q. ``twist_changed``: whether a
-kinematic body has another velocity than in the last step. ``flights_cut``: ticks, or parts
-of them, in which flight steps reached their bound. ``ledger``: see above."""
+have, s (0: any); ``smooth_dt``, s, if the next may be longer than the nominal step, else 0;
+``acceleration_dt``, s, the length of the step of which ``accelerations`` are, 0 if there is none.
+Work of pushes, of grabs, and of position correction beyond its share of the kinetic energy, J.
+Spurious energy gained in steps, J: removed from the motion, and left, where nothing moved.
+``gaps_current``: whether the gaps are those at q. ``twist_changed``: whether a kinematic body has
+another velocity than in the last step. ``flights_cut``: ticks, or parts of them, in which flight
+steps reached their bound. ``ledger``: see above."""
 
 ClusterState = collections.namedtuple(
     'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '
-    'contact_accelerations bone_states doll_sums contact_impulses impact_count impact_log '
-    'loads springs')
+    'contact_accelerations accelerations bone_states doll_sums contact_impulses impact_count '
+    'impact_log loads springs')
 """The state of a cluster. ``q`` (nq,), ``v`` (nv,): generalized coordinates and velocities, angular
 velocities of roots along the roots' own axes. ``dense_step`` (1,), with its polynomial
 ``dense_output`` (8, nq + nv) and the state derivatives at its ends, ``end_rates`` (2, nq + nv).
 ``stats`` (1,). ``excluded`` (p,): flags of the pairs within dolls, see system.py. ``contacts``: of
 the last step. ``gaps``: see contact/gaps.py, with room for those of points.
-``contact_accelerations`` (nv,): by contacts in the last step, zero unless all of them persist.
+``contact_accelerations`` (nv,): by contacts in the last step, zero unless all of them persist;
+``accelerations`` (nv,): all, in the mean.
 Output: ``bone_states`` (n, 13), ``doll_sums`` (d,), and ``contact_impulses`` (n, 3) N s: of
 contacts on each bone since the start, world frame; ``impact_log`` (k,): of the last advance, where
 k is not 0, and ``impact_count`` (1,), how many there were, more than k if there was no room for
@@ -112,7 +118,8 @@ def make_cluster_state(system: System, contacts: int = 0) -> ClusterState:
         end_rates=np.zeros((2, nq + nv)), dense_step=np.zeros(1, DENSE_STEP),
         stats=np.zeros(1, STEP_STATS), excluded=np.zeros(len(system.pairs), np.int64),
         contacts=np.zeros(contacts, CONTACT), gaps=np.zeros(gap_count(system) + contacts),
-        contact_accelerations=np.zeros(nv), bone_states=np.zeros((len(system.tree), 13)),
+        contact_accelerations=np.zeros(nv), accelerations=np.zeros(nv),
+        bone_states=np.zeros((len(system.tree), 13)),
         doll_sums=np.zeros(len(system.doll_masses), DOLL_SUMS),
         contact_impulses=np.zeros((len(system.tree), 3)), impact_count=np.zeros(1, np.int64),
         impact_log=np.zeros(0, IMPACT), loads=np.zeros(0, LOAD),

@@ -709,7 +709,8 @@ def _invalidate(cluster: Cluster) -> None:
     """Discard a cluster's dense step, contacts, gaps and step lengths: q or v has been set."""
     cluster.islands = []
     cluster.state.dense_step[:] = cluster.state.contact_accelerations[:] = 0
-    for name in ('contact_count', 'ended_without_impact', 'last_dt', 'next_dt', 'gaps_current'):
+    for name in ('contact_count', 'ended_without_impact', 'last_dt', 'next_dt', 'smooth_dt',
+                 'acceleration_dt', 'gaps_current'):
         cluster.state.stats[name] = 0
 
 

@@ -10,7 +10,7 @@ from ...kernels.cluster_state import ClusterState, make_cluster_state
 from ...kernels.system import System
 
 SNAPSHOT = ('dense_output', 'end_rates', 'dense_step', 'excluded', 'gaps', 'contact_accelerations',
-            'q', 'v', 'bone_states', 'doll_sums', 'contact_impulses', 'stats')
+            'accelerations', 'q', 'v', 'bone_states', 'doll_sums', 'contact_impulses', 'stats')
 """Fields that a snapshot stores beside the contacts."""
 
 CONTACTS_PER_GEOM = 12

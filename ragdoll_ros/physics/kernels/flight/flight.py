@@ -13,6 +13,7 @@ from ..dynamics.body import WORLD
 from ..dynamics.forward_dynamics import state_derivative
 from ..dynamics.kinematics import forward_kinematics, place_geoms
 from ..maths.vectors import dot, norm, vec
+from ..stepping.local_error import forget_accelerations
 from ..stepping.step_control import clear_contact_accelerations
 from ..stepping.work import load_power
 from ..system import System
@@ -117,6 +118,7 @@ def follow_dense_step(s: System, ws: Workspace, cluster: ClusterState,
                     s.tree, flight.kinematics, loads[k], False)
     step.elapsed += gone
     clear_contact_accelerations(cluster)
+    forget_accelerations(cluster)
     evaluate_dense_step(s.tree, cluster, step.elapsed, cluster.q, cluster.v)
     if step.elapsed < end - 1e-15:
         return gone, False

@@ -18,6 +18,7 @@ from ..system import System
 from ..workspace import Workspace
 from .contact_step import MAX_PENETRATION, SOLVED_SPEED, contact_step, finish_step
 from .impact_log import log_impacts
+from .local_error import is_too_long, set_smooth_dt
 from .momentum import (REMOVABLE, count_contact_impulses, internal_kinetic_energy, remove_energy,
                        total_energy)
 from .position_correction import PAID_SHARE
@@ -85,6 +86,11 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             pushes, grabs, corrections)
         ledger.trials += 1
         m = contact_step(s, ws, cluster, length, since)
+        if turn < MAX_TRIES - 1 and is_too_long(cluster, step.v_end, length, nominal):
+            ledger.too_coarse += 1
+            length = begin_trials(s, ws, cluster, nominal, nominal)
+            clear_contact_accelerations(cluster)
+            continue
         start_cycles = cycles()
         finish_step(s, ws, cluster, length, since, m)
         ledger.finish_cycles += cycles() - start_cycles
@@ -135,6 +141,7 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             stats.energy_unremoved += gained - removed
         break
     count_contact_impulses(s, ws, m, cluster.contact_impulses)
+    set_smooth_dt(cluster, step.v_end, length, nominal)
     accept_step(ws, cluster, m, length, length > 0.1 * h)
     if not seek and len(cluster.impact_log):
         log_impacts(s, ws, cluster, m, True, SLOW, since)
