@@ -13,8 +13,9 @@ from ....model.coordinates import DofLayout
 from ....model.scene import Scene
 from ....model.scene_change import SceneChange
 from ...accuracy import Accuracy
-from ...kernels.cluster_state import IMPACT, LEDGER, STEP_STATS, ClusterState, make_cluster_state
-from ...kernels.compiling.bundle import bind
+from ...kernels.cluster_state import (CLUSTER_STATE, IMPACT, LEDGER, STEP_STATS, ClusterState,
+                                      make_cluster_state)
+from ...kernels.compiling.bundle import bind, rebind
 from ...kernels.contact_kind import LIMIT
 from ...kernels.dynamics.body import MOVED, WORLD
 from ...kernels.loaded import advance as kernels, links
@@ -78,9 +79,13 @@ class Cluster:
 
     def set_loads(self, loads: np.ndarray, springs: np.ndarray) -> None:
         """Set the loads and springs; discard the dense step."""
-        self.state = self.state._replace(loads=loads, springs=springs)
-        self.bundles[1][0][:] = bind(self.state)[0]
-        self.state.dense_step[:] = 0
+        state, row = self.state, self.bundles[1][0]
+        if loads is not state.loads:
+            rebind(row, CLUSTER_STATE, 'loads', loads)
+        if springs is not state.springs:
+            rebind(row, CLUSTER_STATE, 'springs', springs)
+        self.state = state._replace(loads=loads, springs=springs)
+        state.dense_step[:] = 0
 
     def log_impacts(self, enabled: bool) -> None:
         """Begin or end to log impacts."""

@@ -5,7 +5,7 @@ The algorithm of a tick is in kernels/advance.py.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -73,6 +73,9 @@ class RigidEngine:
         self._age = np.full(len(scene.dolls), MAX_AGE)
         """(d,) intervals since the cluster of each doll was formed."""
         self._impacts: Impacts | None = None
+        self._standing: tuple = (None, None, b'', [])
+        """Clusters, springs, and what yields, of the last interval with springs alone, and their
+        records: motors with targets that stand are the same for many intervals."""
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]
         """Pairs that overlap at the start: they are excluded until they separate."""
@@ -191,8 +194,9 @@ class RigidEngine:
         twisted, self._twisted = self._twisted, []
         self._last_start = clusters.q.copy(), clusters.v.copy(), duration, actions, twisted
         of_doll = self.cluster_of_doll
-        for acts in (*wrenches, *springs, *drives):
-            self._wake(of_doll == of_doll[self.scene.doll_of_bone[acts.bone]])
+        acted_on = [acts.bone for acts in (*wrenches, *springs, *drives)]
+        if acted_on and np.count_nonzero(self.sleeping):
+            self._wake(np.isin(of_doll, of_doll[self.scene.doll_of_bone[acted_on]]))
         self._update_clusters(duration)
         self._advance(duration, actions, self.accuracy, twisted)
         self._impacts = self._clusters.impacts()
@@ -386,6 +390,21 @@ class RigidEngine:
 
     def _apply_actions(self, actions: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
         """Set loads and springs of the clusters that ``actions`` act on; returns these clusters."""
+        wrenches, springs, drives = actions
+        clusters, yielding = self._clusters.members, self._yielding.tobytes()
+        last_clusters, last_springs, last_yielding, records = self._standing
+        if wrenches or drives or springs is not last_springs or clusters is not last_clusters or (
+                yielding != last_yielding):
+            records = list(self._records_of(actions))
+            if not (wrenches or drives):
+                self._standing = clusters, springs, yielding, records
+        for cluster, loads, held in records:
+            cluster.set_loads(loads, held)
+        return [cluster for cluster, *_ in records]
+
+    def _records_of(self, actions: tuple[Wrenches, Springs, Drives]) -> Iterator[
+            tuple[Cluster, np.ndarray, np.ndarray]]:
+        """The clusters that ``actions`` act on, each with its loads and springs."""
         acts: dict[int, tuple[list, list, list]] = {}
         for kind, given in enumerate(actions):
             for one in given:
@@ -394,15 +413,12 @@ class RigidEngine:
                     continue
                 place = int(self._clusters.of_doll[doll])
                 acts.setdefault(place, ([], [], []))[kind].append(one)
-        acted = []
         for place, (loads, springs, drives) in acts.items():
             cluster = self._clusters.members[place]
             bones = cluster.bones.tolist()
             bodies = cluster.system.tree['bone'].tolist()
-            cluster.set_loads(load_records(loads, bones),
-                              spring_records(springs, drives, self.scene, bones, bodies))
-            acted.append(cluster)
-        return acted
+            yield cluster, load_records(loads, bones), spring_records(
+                springs, drives, self.scene, bones, bodies)
 
     def _refresh(self) -> None:
         """Recompute bone states, sums and gaps from q and v."""

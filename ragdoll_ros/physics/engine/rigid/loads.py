@@ -2,6 +2,7 @@
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ....model.scene import Scene
 from ...kernels.dynamics.loads import (ANGULAR_DRIVE, GRAB, JOINT_SPRING, LINEAR_DRIVE, LOAD,
@@ -10,11 +11,12 @@ from ..protocol import AppliedDrive, AppliedJointSpring, Drives, Spring, Springs
 
 NO_LOADS = np.zeros(0, LOAD)
 NO_SPRINGS = np.zeros(0, SPRING)
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 def load_records(wrenches: Wrenches, bones: list[int]) -> np.ndarray:
     """LOAD records (m,) of wrenches; ``bones``: indices in the scene of a cluster's bones."""
-    loads = np.zeros(len(wrenches), LOAD)
+    loads = np.zeros(len(wrenches), LOAD) if wrenches else NO_LOADS
     for load, wrench in zip(loads, wrenches, strict=True):
         load['bone'], load['local'] = bones.index(wrench.bone), wrench.local
         load['force'], load['torque'], load['point'] = wrench.force, wrench.torque, wrench.point
@@ -36,44 +38,38 @@ def spring_records(springs: Springs, drives: Drives, scene: Scene, bones: list[i
     return np.array(records, SPRING) if records else NO_SPRINGS
 
 
-def _grab(body: int, spring: Spring) -> np.ndarray:
+def _grab(body: int, spring: Spring) -> tuple:
     spring = spring.after(0.0)
-    record = _record(GRAB, body, spring.stiffness, spring.damping, spring.most)
-    record['point'], record['target'] = spring.point, spring.position
-    if spring.left > 0:
-        record['target_velocity'] = (spring.target - spring.position) / spring.left
-    record['time_left'] = spring.left
-    return record
+    moves = spring.left > 0
+    return _record(GRAB, body, spring.stiffness, spring.damping, spring.most, point=spring.point,
+                   target=spring.position, time_left=spring.left, velocity=(
+                       (spring.target - spring.position) / spring.left if moves else ORIGIN))
 
 
-def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> np.ndarray:
+def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> tuple:
     """Its mobility is that of the bone alone about its thinnest axis, an upper bound."""
-    record = _record(JOINT_SPRING, body, hold.stiffness, hold.damping, hold.most)
-    record['axis'], record['target_angle'] = hold.axis, hold.target
-    record['target_velocity'][0], record['time_left'] = hold.rate, hold.left
-    record['mobility'] = 1 / min(scene.bones[hold.bone].inertia)
-    return record
+    return _record(JOINT_SPRING, body, hold.stiffness, hold.damping, hold.most, axis=hold.axis,
+                   angle=hold.target, velocity=(hold.rate, 0.0, 0.0), time_left=hold.left,
+                   mobility=1 / min(scene.bones[hold.bone].inertia))
 
 
-def _drive(body: int, drive: AppliedDrive, scene: Scene) -> list[np.ndarray]:
+def _drive(body: int, drive: AppliedDrive, scene: Scene) -> list[tuple]:
     """Up to two springs without stiffness, at the bone's center of mass. Their mobility is the
     bone's own, an upper bound: overestimated stiffness moves the evaluation towards the step's end.
     """
-    bone, records = scene.bones[drive.bone], []
+    bone = scene.bones[drive.bone]
     mobilities = 1 / bone.mass, 1 / min(bone.inertia)
-    for kind, target, gain, most, mobility in zip(
-            (LINEAR_DRIVE, ANGULAR_DRIVE), drive.targets, drive.gains, drive.most, mobilities,
-            strict=True):
-        if gain > 0:
-            record = _record(kind, body, 0.0, gain, most)
-            record['target_velocity'], record['mobility'] = target, mobility
-            records.append(record)
-    return records
+    return [_record(kind, body, 0.0, gain, most, velocity=target, mobility=mobility)
+            for kind, target, gain, most, mobility in zip(
+                (LINEAR_DRIVE, ANGULAR_DRIVE), drive.targets, drive.gains, drive.most, mobilities,
+                strict=True) if gain > 0]
 
 
-def _record(kind: int, body: int, stiffness: float, damping: float, most: float) -> np.ndarray:
-    """A spring record with these values; its target is the origin, at rest, for ever."""
-    record = np.zeros((), SPRING)
-    record['kind'], record['body'], record['time_left'] = kind, body, math.inf
-    record['stiffness'], record['damping'], record['max_force'] = stiffness, damping, most
-    return record
+def _record(kind: int, body: int, stiffness: float, damping: float, most: float, *, axis: int = 0,
+            point: ArrayLike = ORIGIN, target: ArrayLike = ORIGIN, velocity: ArrayLike = ORIGIN,
+            angle: float = 0.0, time_left: float = math.inf, mobility: float = 0.0) -> tuple:
+    """A SPRING record as a tuple, in the order of its fields; by default its target is the origin,
+    at rest, for ever.
+    """
+    return (kind, body, axis, 0, point, target, velocity, angle, time_left, stiffness, damping,
+            most, ORIGIN, mobility)

@@ -58,6 +58,13 @@ def bind(parts: tuple) -> list[np.ndarray]:
     return [np.array(row, np.int64), *rows]
 
 
+def rebind(row: np.ndarray, kind: Bundle, name: str, part: np.ndarray) -> None:
+    """Bind another array as field ``name``, an array, in the own ``row`` of a bundle of a kind."""
+    assert part.flags.c_contiguous
+    place, _ = kind.fields[name]
+    row[place:place + 1 + part.ndim] = part.ctypes.data, *part.shape
+
+
 def bundle_at(kind: Bundle) -> Callable[[int], object]:
     """A function for compiled code that returns the bundle at the address of a row."""
     @intrinsic
