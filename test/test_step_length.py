@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from loose_bodies import box
+from loose_bodies import RADIUS, ball, box
 
 from ragdoll_ros import Bone, Box, Ground, Joint, Placement, Push, Ragdoll, Scene
 from ragdoll_ros.files.scene import load_scene
@@ -110,3 +110,19 @@ def test_no_step_is_longer_than_the_longest():
         for _ in range(10):
             simulation.advance()
         assert simulation.ledger()['steps'] - before == 10 * math.ceil(0.05 / LONGEST_STEP)
+
+
+@pytest.mark.parametrize('name', ACCURACIES)
+def test_what_meets_slowly_in_a_long_step_is_no_deeper_than_in_a_nominal_one(name):
+    """A ball slides at 15 mm/s on smooth ground against a post, at any part of a tick."""
+    for gap in np.linspace(1.3e-3, 1.45e-3, 7):
+        scene = Scene('post', (
+            Placement(ball(), 'ball', (0.0, 0.0, RADIUS), velocity=(0.015, 0, 0)),
+            Placement(box((0.2, 0.2, 0.4), 1e4, 'post'), 'post', (RADIUS + gap + 0.1, 0.0, 0.2))),
+            Ground(), Material(friction=0.0, restitution=0.0))
+        with Simulation(scene, accuracy=AWAKE[name]) as simulation:
+            before, x = simulation.ledger()['steps'], simulation.run(8)[-1, 0, 0]
+            assert simulation.ledger()['steps'] - before < 8 * simulation.step / AWAKE[name].step
+            deepest = max(x - gap, (simulation.run(6)[:, 0, 0] - gap).max())
+            # As far as it moves in a nominal step, and what counts as touching.
+            assert deepest < 0.015 * AWAKE[name].step + AWAKE[name].touching

@@ -53,9 +53,15 @@ def allowed_error(nominal: float) -> float:
 
 
 @compiled
+def is_longer(h: float, nominal: float) -> bool:
+    """Whether a step of h s is longer than ``nominal`` s, but for rounding."""
+    return h > (1 + ROUNDING) * nominal
+
+
+@compiled
 def is_too_long(cluster: ClusterState, v_end: np.ndarray, h: float, nominal: float) -> bool:
     """Whether the step of h s just taken is longer than ``nominal`` s and its error too large."""
-    return h > (1 + ROUNDING) * nominal and not (
+    return is_longer(h, nominal) and not (
         local_error(cluster, v_end, h) <= allowed_error(nominal))
 
 
@@ -73,7 +79,7 @@ def set_smooth_dt(cluster: ClusterState, v_end: np.ndarray, h: float, nominal: f
     longer = min(longer, LONGEST_STEP)
     if longer * speed > nominal * SLOW_MOTION:
         longer = nominal * SLOW_MOTION / speed
-    stats.smooth_dt = longer if longer > (1 + ROUNDING) * nominal else 0.0
+    stats.smooth_dt = longer if is_longer(longer, nominal) else 0.0
     for j in range(len(v_end)):
         cluster.accelerations[j] = (v_end[j] - cluster.v[j]) / h
     stats.acceleration_dt = h

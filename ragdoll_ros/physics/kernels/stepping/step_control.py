@@ -18,7 +18,7 @@ from ..system import System
 from ..workspace import Workspace
 from .contact_step import MAX_PENETRATION, SOLVED_SPEED, contact_step, finish_step
 from .impact_log import log_impacts
-from .local_error import is_too_long, set_smooth_dt
+from .local_error import is_longer, is_too_long, set_smooth_dt
 from .momentum import (REMOVABLE, count_contact_impulses, internal_kinetic_energy, remove_energy,
                        total_energy)
 from .position_correction import PAID_SHARE
@@ -94,6 +94,11 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         start_cycles = cycles()
         finish_step(s, ws, cluster, length, since, m)
         ledger.finish_cycles += cycles() - start_cycles
+        if turn < MAX_TRIES - 1 and is_longer(length, nominal) and any_closed(ws):
+            ledger.too_coarse += 1
+            length = begin_trials(s, ws, cluster, nominal, nominal)
+            clear_contact_accelerations(cluster)
+            continue
         now, speed = total_energy(step.sums_after)
         work = stats.work_pushes - pushes + stats.work_grabs - grabs
         gained = now - held - work
@@ -279,6 +284,16 @@ def solver_energy(s: System, ws: Workspace, m: int, h: float) -> float:
     scalars = ws.step.scalars[0]
     return max(10 * SOLVED_SPEED * scalars.solve_error, scalars.residual) * min(
         total, jam_threshold(s, ws, h))
+
+
+@compiled
+def any_closed(ws: Workspace) -> bool:
+    """Whether a gap that was open as the step just taken began is overshot at its end."""
+    touching = ws.step.scalars[0].touching
+    for j in range(ws.gap_counts[0].live):
+        if ws.gaps[j] > touching and ws.contacts.gaps_end[j] < OVERSHOT:
+            return True
+    return False
 
 
 @compiled
