@@ -39,11 +39,11 @@ def spring_records(springs: Springs, drives: Drives, scene: Scene, bones: list[i
 
 
 def _grab(body: int, spring: Spring) -> tuple:
-    spring = spring.after(0.0)
-    moves = spring.left > 0
+    spring, velocity = spring.after(0.0), ORIGIN
+    if spring.left > 0:
+        velocity = (spring.target - spring.position) / spring.left
     return _record(GRAB, body, spring.stiffness, spring.damping, spring.most, point=spring.point,
-                   target=spring.position, time_left=spring.left, velocity=(
-                       (spring.target - spring.position) / spring.left if moves else ORIGIN))
+                   target=spring.position, velocity=velocity, time_left=spring.left)
 
 
 def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> tuple:
