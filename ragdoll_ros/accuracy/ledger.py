@@ -21,7 +21,7 @@ SCENES = ('drop', 'woman_faints', 'ponytail', 'crowd')
 
 REJECTED = {'past_impact': 'past a time of impact', 'closed_unseen': 'a gap that closed too far',
             'new_contacts': 'new contacts within the step', 'too_deep': 'penetration',
-            'too_coarse': 'local error of a longer step',
+            'too_coarse': 'error of a longer step, or a contact that began in it',
             'too_much_energy': 'energy gain'}
 """Counts of rejected trials, and why."""
 

@@ -65,12 +65,12 @@ LEDGER = np.dtype([
         'solve_cycles', 'finish_cycles', 'impact_cycles', 'all_cycles'))], align=True)
 """What a cluster's steps are made of, since the start. Trials of contact steps, and those that were
 rejected: for the energy that they added, for penetration, for the local error of a step longer than
-the nominal one, or what touched in it, for what closed faster than is allowed where impacts are not sought, for contacts
-that they had not known, to end at an impact. Islands that were solved, with their contacts, rows,
-and degrees of freedom of their dolls; Newton steps. Times that all gaps were found, and pairs of
-which that took a narrow phase. Cycles of the processor in: finding gaps outside of steps, flight,
-the beginning of steps, motion without contacts, finding contacts, their solve, the end of steps
-with its gaps, impacts, and all."""
+the nominal one or for what met in it, for what closed faster than is allowed where impacts are not
+sought, for contacts that they had not known, to end at an impact. Islands that were solved, with
+their contacts, rows, and degrees of freedom of their dolls; Newton steps. Times that all gaps were
+found, and pairs of which that took a narrow phase. Cycles of the processor in: finding gaps outside
+of steps, flight, the beginning of steps, motion without contacts, finding contacts, their solve,
+the end of steps with its gaps, impacts, and all."""
 
 STEP_STATS = np.dtype([
     ('flight_steps', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
