@@ -1,27 +1,28 @@
-"""Advance clusters of dolls by a time, as the algorithm reads.
+"""Advance clusters of dolls by a time: the steps of the algorithm in order.
 
 One tick of a cluster, and what its stages read and write:
 
     advance ── for each cluster: advance_cluster
       enable_separated_pairs     q, excluded -> excluded          pairs that overlapped at the start
-      integrate_positions        q, v -> q                        where all bodies move as told
+      integrate_positions        q, v -> q                        if all bodies are kinematic
       or
-      update_kinematics_and_gaps q, v -> kinematics, gaps         narrow phase
-      follow_twist               q, gaps -> v                     what a kinematic body carries
+      update_kinematics_and_gaps q, v -> kinematics, gaps         narrow phase, if not current
+      follow_twist               q, gaps -> v                     a kinematic body's twist changed
       until the time is up:
-        can_fly                  gaps, contacts, v                does everything separate?
+        can_fly                  gaps, contacts, v                no contact, or all separate?
         begin_dense_step         q, v, loads -> dense_step        DOP853 with dense output
         find_first_contact       dense_step -> event_time         conservative advancement
-        follow_dense_step        dense_step -> q, v               to the event or the time's end
+        follow_dense_step        dense_step -> q, v               to the first contact or the end
       or
         begin_contact_step       q, v -> start contacts, their points, sums_before
+        approaches_fast          start contacts                   an impact first?
         step_to_impact           q, v, gaps -> q, v, gaps         step control, time of impact
           contact_step           -> q_end, v_end                  Moreau's centered scheme
             unconstrained_velocity  middle, loads, springs -> v_free, factor of the mass matrix
             find_contacts           middle, gaps_active -> contacts
             warm_start              last contacts -> impulses
             set_slip_friction       middle, impulses -> friction points of faces that slip
-            solve_contacts          contacts, v_free -> v_change, correction   islands
+            solve_contacts          contacts, v_free -> v_change, correction   by islands
           finish_step            v_end, correction -> q_end, v_end, gaps_end   position correction
           log_impacts               contacts -> impact_log          where impacts are not sought
           update_bracket, next_trial_step   gaps_end -> length of the next trial
@@ -67,11 +68,12 @@ LONGEST_FLIGHT = 0.05
 
 FLIGHT_WORK, MIN_FLIGHT_STEPS = 7000, 100
 """Steps of flight that may be tried in one tick, or in its part between two changes of the pushes,
-times the number of bodies, and their least number. Then, which is counted, as many more may with
-the tolerance times CUT_TOLERANCE, and after those contact steps, of which there are never many."""
+times the number of bodies, and their least number. After these, as many more are tried with the
+tolerance times CUT_TOLERANCE, which flights_cut counts; then contact steps alone."""
 
 CUT_TOLERANCE = 1e6
-"""Steps of order 8 are 5.6 times as long; what needs so many turns at 1000 rad/s and more."""
+"""It makes steps of order 8 5.6 times as long. Only bodies that turn at 1000 rad/s and more need
+that many steps."""
 
 MAX_IMPACTS, IMPACT_WORK, MIN_IMPACTS = 200, 2_000_000, 8
 """Times of impact that are sought in a tick, at most and over the cube of the number of bodies, so
@@ -234,8 +236,9 @@ def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float,
     ``duration`` 0: only recompute these and the gaps.
 
     ``jobs`` (k, 3): addresses of the bundles of system, workspace and state of each. ``step``:
-    length of a contact step, s; ``tolerance``: error of a step of flight, m or rad;
-    ``solve_error``, ``touching``: see physics/accuracy.py.
+    nominal length of a step in contact, s; ``tolerance``: error of a step of flight, m or rad;
+    ``solve_error``: residual of the contact solve, m/s; ``touching``: gap that counts as contact,
+    m.
     """
     for k in range(len(jobs)):
         system, workspace, cluster = vec(jobs[k])

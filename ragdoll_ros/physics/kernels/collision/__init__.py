@@ -1,1 +1,1 @@
-"""Narrow phase: contact manifolds and distances of pairs of shapes."""
+"""Narrow phase: contact manifolds and distances of two shapes. Broad phase: sweep and prune."""

@@ -143,7 +143,7 @@ def _clip_to_face(shape: Shape, p: Vec3, u: Vec3, half: float, n: Vec3) -> tuple
 
 @compiled
 def capsule_separation(a: Shape, b: Shape) -> float:
-    """Signed distance, m, of a sphere or capsule a from any shape b."""
+    """Signed distance, m, of a sphere or capsule a from a solid shape b."""
     c, half = sub(a.position, b.position), a.size[1]
     p, u = to_local(b.rotation, c), to_local(b.rotation, column(a.rotation, 2))
     t = closest_parameter(b, p, u, half)

@@ -66,7 +66,9 @@ def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tupl
 
 @compiled
 def _box_face(shape: Shape, n: Vec3, corners: np.ndarray) -> int:
-    """Write the corners of the face that supports along n (box frame); returns its id."""
+    """Write the corners of the box's face that is farthest along n, relative to its center, world
+    axes; n: in the box's frame. Returns the id of the face: 2 * axis, + 1 on the negative side.
+    """
     size, axis, most = shape.size, 2, n[2]
     if abs(n[0]) > abs(most):
         axis, most = 0, n[0]

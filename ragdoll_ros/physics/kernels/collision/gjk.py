@@ -31,8 +31,9 @@ Nearest = tuple[float, Vec3, int]
 @compiled
 def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: float,
                       simplex: np.ndarray, count: int, n: Vec3) -> Direction:
-    """Unit vector from b to a between their closest points; both, scaled by ``ratio``, are
-    disjoint. Returns the number of vertices of the last simplex, and the vector.
+    """Unit vector from b to a between the closest points of both shapes scaled by ``ratio`` about
+    their centers. So scaled, they must be disjoint. Returns the number of vertices of the last
+    simplex, and the vector.
 
     c: offset of a's center from b's, m; ``tolerance``: relative error of the distance. It starts
     with n and the first ``count`` vertices of an earlier ``simplex`` (4,), which is overwritten.

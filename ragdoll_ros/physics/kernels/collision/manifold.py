@@ -63,7 +63,7 @@ def reduce_points(points: np.ndarray, count: int) -> int:
 
 @compiled
 def sort_points(points: np.ndarray, count: int) -> None:
-    """Sort points by their feature ids, in place: those of one patch keep their order."""
+    """Sort points by feature id, in place, so that a patch has the same order in every step."""
     for i in range(1, count):
         for k in range(i, 0, -1):
             if points[k - 1].feature_id <= points[k].feature_id:

@@ -55,7 +55,9 @@ Axis = tuple[float, Vec3]
 
 @compiled
 def separation_along(a: Shape, b: Shape, c: Vec3, n: Vec3) -> float:
-    """Separation s(n), m; of a capsule that of its axis."""
+    """Separation s(n), m, along unit n; ``c``: offset of a's center from b's, m. A capsule counts
+    as its axis, without its radius.
+    """
     return dot(c, n) - core_extent(a, neg(n)) - core_extent(b, n)
 
 
@@ -198,7 +200,10 @@ def _towards(c: Vec3, n: Vec3) -> Vec3:
 
 @compiled
 def refine_axis(a: Shape, b: Shape, c: Vec3, start: Axis) -> Axis:
-    """The axis of largest separation of all; ``start``: the best face or edge axis."""
+    """Improve ``start``, the best face or edge axis, until the separation along it no longer grows:
+    by the growth distance where the shapes overlap, then by closest points. Returns the axis of
+    largest separation. ``c``: offset of a's center from b's, m.
+    """
     # a bare 0 is a type of its own to numba, for which it would compile all once more
     simplex, count = np.empty(4, SIMPLEX_VERTEX), np.int64(0)
     gap = GAP_RATIO * (bounding_radius(a) + bounding_radius(b))

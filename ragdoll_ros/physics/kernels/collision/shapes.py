@@ -138,10 +138,12 @@ def _perpendicular(u: Vec3) -> Vec3:
 
 @compiled
 def signed_distance(shape: Shape, p: Vec3, u: Vec3) -> tuple[float, Vec3]:
-    """Signed distance, m, of a point from the surface, and its gradient; all in the shape's frame.
+    """Signed distance, m, of a point from the surface, negative inside, and its unit gradient, in
+    the frame of the shape: a sphere, capsule, cylinder, box or hull.
 
-    It is convex, as the shapes are. Where the gradient is not unique, one perpendicular to u.
-    Ericson, Real-Time Collision Detection (2005), section 5.1.
+    It is convex, as the shapes are. At the center of a sphere and on the axis of a capsule or
+    cylinder, the gradient is perpendicular to the axis and to the direction u. Ericson, Real-Time
+    Collision Detection (2005), section 5.1.
     """
     size = shape.size
     if shape.kind == BOX:
@@ -160,6 +162,7 @@ def signed_distance(shape: Shape, p: Vec3, u: Vec3) -> tuple[float, Vec3]:
 
 @compiled
 def _box_distance(size: Vec3, p: Vec3) -> tuple[float, Vec3]:
+    """signed_distance() of a box: m, negative inside, and its unit gradient; size: half extents."""
     x, y, z = p
     a, b, c = abs(x) - size[0], abs(y) - size[1], abs(z) - size[2]
     if a <= 0 and b <= 0 and c <= 0:

@@ -33,7 +33,7 @@ register_model(Bundle)(models.OpaqueModel)
 
 
 def bundle_type(parts: tuple) -> Bundle:
-    """The Bundle of named tuples with fields like those of ``parts``."""
+    """Type of a bundle whose fields have the names and types of the named tuple ``parts``."""
     place, fields = 0, {}
     for name, part in zip(parts._fields, parts, strict=True):
         inner = isinstance(part, tuple)
@@ -59,7 +59,9 @@ def bind(parts: tuple) -> list[np.ndarray]:
 
 
 def rebind(row: np.ndarray, kind: Bundle, name: str, part: np.ndarray) -> None:
-    """Bind another array as field ``name``, an array, in the own ``row`` of a bundle of a kind."""
+    """Point field ``name`` of the bundle that has this ``row`` at another array, C-contiguous and
+    of the same type, which the caller keeps alive.
+    """
     assert part.flags.c_contiguous
     place, _ = kind.fields[name]
     row[place:place + 1 + part.ndim] = part.ctypes.data, *part.shape
@@ -78,7 +80,7 @@ def bundle_at(kind: Bundle) -> Callable[[int], object]:
 
 @intrinsic
 def address_of(context: object, bundle: types.Type) -> tuple:
-    """The address of a bundle's row."""
+    """Address, int64, of the row that a bundle points to: a numba intrinsic."""
     def generate(context: object, builder: ir.IRBuilder, signature: object,
                  values: list) -> ir.Value:
         return builder.ptrtoint(values[0], WORD)

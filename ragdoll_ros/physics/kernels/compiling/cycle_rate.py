@@ -7,7 +7,7 @@ from .decorators import entry
 
 @entry()
 def cycles_now() -> int:
-    """The counter, for Python."""
+    """Cycles of the processor, as cycles() counts them; 0 where they are not counted."""
     return cycles()
 
 

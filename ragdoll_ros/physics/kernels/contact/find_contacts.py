@@ -178,8 +178,8 @@ def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) 
 
 @compiled
 def is_on_plane(s: System, patch: int) -> bool:
-    """Whether a contact patch is with the ground or a plane, where each point has its own gap; or
-    of none, as a limit's.
+    """Whether a contact patch, not of a joint limit, is with the ground or a plane body, where each
+    point has its own gap.
     """
     return patch < len(s.geoms) or s.geoms[s.pairs[patch - len(s.geoms)].b].kind == PLANE
 

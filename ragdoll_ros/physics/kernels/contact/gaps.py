@@ -227,8 +227,11 @@ def ground_gaps(s: System, geom: np.record, position: np.ndarray, r: np.ndarray,
 @compiled
 def ground_point(s: System, geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
                  normal: Vec3) -> Vec3:
-    """Ground point k of a geom, world, m: of a sphere the lowest, of a capsule the lowest of each
-    end, of a box or hull the corners, of each end of a cylinder the lowest and four of its rim.
+    """Point k of a geom that may touch the ground, world, m.
+
+    Sphere: the lowest. Capsule: the lowest of end k. Box, hull: corner k. Cylinder, k = 5 end + i:
+    the lowest of that end's rim, and four others of it. ``position``: of the geom relative to the
+    origin of ``r``'s frame, m; r (3, 3): its rotation; ``normal``: of the ground.
     """
     size = geom.size
     x = y = z = 0.0

@@ -10,7 +10,7 @@ from ..maths.transcendental import asinh
 from ..maths.vectors import add, add_scaled, divide, dot, put, sub, vec
 from ..workspace import Contacts
 
-SEGMENT = 0.5
+SEGMENT_MEAN = 0.5
 """Mean distance of a segment's points from its center, over that of its ends."""
 
 DEGENERATE = 1e-3
@@ -32,7 +32,7 @@ def contract_friction_points(contacts: Contacts, begin: int, end: int) -> None:
         j = (k + 1) % count
         part, mean = triangle_moment(contacts.u[k], contacts.v[k], contacts.u[j], contacts.v[j])
         area, moment = area + part, moment + mean
-    share = SEGMENT
+    share = SEGMENT_MEAN
     if area > DEGENERATE * corners * corners:
         share = min(1.0, moment / area / corners)
     elif corners == 0.0:

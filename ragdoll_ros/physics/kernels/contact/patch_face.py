@@ -32,7 +32,9 @@ its center over that of its corners. Corners, from the center: in contacts.u and
 @compiled
 def measure_face(s: System, contacts: Contacts, kin: Kinematics, begin: int, end: int,
                  middle: Vec3) -> tuple[Vec3, Face]:
-    """Center, m, and face of a patch whose points have this ``middle``, m."""
+    """Centroid of the area, m, world, and Face of the patch of the contacts begin to end - 1, whose
+    points have the mean ``middle``, m. Overwrites contacts.u and v: corners from the centroid, m.
+    """
     found, count, u, v = contacts.found, end - begin, contacts.u, contacts.v
     first = found[begin]
     disc = cylinder_of_patch(s, first.patch) if count > 2 else -1
@@ -89,8 +91,11 @@ def measure_segment(c: np.record, count: int, middle: Vec3, u: np.ndarray,
 @compiled
 def pressed_part(contacts: Contacts, count: int, face: Face, px: float,
                  py: float) -> tuple[float, float, float]:
-    """Size of the part of the face, a copy of it, over which a pressure with the center (px, py) is
-    affine and nowhere negative, over the face's, and the part's own center.
+    """Part of the face that carries a pressure with the center (px, py), m, without tension.
+
+    The part is a scaled copy of the face, over which an affine pressure with that center is
+    nowhere negative. Returns its scale, 0 to 1, and its centroid, m: 1 and (0, 0) is the whole
+    face.
     """
     u, v = contacts.u, contacts.v
     if face[0] == DISC:
@@ -126,8 +131,13 @@ def face_moments(contacts: Contacts, count: int, face: Face, x: float, y: float)
 
 @compiled
 def resultant_and_moment(face: Face, moments: Moments, px: float,
-                    py: float) -> tuple[float, float, float]:
-    """Means of y/|y|, two numbers, and of |y| under the affine pressure with this center."""
+                         py: float) -> tuple[float, float, float]:
+    """Friction of a turning patch for a unit friction coefficient and normal force: its resultant,
+    two numbers, before it is turned by 90 degrees, and its moment, m, about the center of rotation.
+
+    They are the means of y/|y| and |y| under the affine pressure whose center, relative to the
+    face's, is (px, py), m; y: offset from the center of rotation, about which ``moments`` are.
+    """
     gx, gy = face[3] * px + face[4] * py, face[4] * px + face[5] * py
     return (moments[0] + gx * moments[2] + gy * moments[4],
             moments[1] + gx * moments[3] + gy * moments[5],

@@ -30,7 +30,7 @@ STILL = 1e-4
 UNSTEADY = 0.25
 """Change of the slip in half a step, as a share of it, above which it says nothing of the next."""
 
-FAR = 50.0
+FAR_CENTER = 50.0
 """Distance of the center, over the size of the patch, from which on a patch merely slides."""
 
 FLAT = 0.999
@@ -64,27 +64,27 @@ def set_slip_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
     while begin < m:
         end = patch_end(found, begin, m)
         if end - begin > 1 and found[begin].kind != LIMIT:
-            known = known_contact(found, begin, end, h > 0)
-            if known >= 0:
-                changed |= spread_over_patch(s, ws, kin, q, begin, end, known, h)
+            reference = reference_contact(found, begin, end, h > 0)
+            if reference >= 0:
+                changed |= spread_over_patch(s, ws, kin, q, begin, end, reference, h)
         begin = end
     return changed
 
 
 @compiled
-def known_contact(contacts: np.ndarray, begin: int, end: int, in_step: bool) -> int:
-    """Index of a contact of a flat patch whose friction has a limit, if ``in_step`` rather one that
-    is persistent; -1 if there is none.
+def reference_contact(contacts: np.ndarray, begin: int, end: int, in_step: bool) -> int:
+    """Index of a contact of a flat patch whose friction has a limit; with ``in_step`` preferably a
+    persistent one. -1 if there is none, or if the patch is not flat.
     """
-    known = -1
+    reference = -1
     for e in range(begin, end):
         c = contacts[e]
         if dot(vec(c.normal), vec(contacts[begin].normal)) < FLAT:
             return -1
-        if 0 < c.friction < NO_SLIP and (known < 0 or (
-                in_step and c.persistent and not contacts[known].persistent)):
-            known = e
-    return known
+        if 0 < c.friction < NO_SLIP and (reference < 0 or (
+                in_step and c.persistent and not contacts[reference].persistent)):
+            reference = e
+    return reference
 
 
 @compiled
@@ -106,9 +106,12 @@ def slip_at(s: System, kin: Kinematics, q: np.ndarray, c: np.record,
 
 @compiled
 def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, begin: int,
-                      end: int, known: int, h: float) -> bool:
-    """Set friction points and shares of contacts begin to end - 1, a patch, with the known contact
-    known_contact(), over a step of h s. Returns whether any has changed by more than MOVED.
+                      end: int, reference: int, h: float) -> bool:
+    """Set the friction points and patch_share, a factor of the friction coefficient, of contacts
+    begin to end - 1, a patch, from their impulses and the slip at q, over a step of h s.
+
+    ``reference``: the contact whose tangents measure the slip. Returns whether any has changed by
+    more than MOVED: none where the patch sticks.
     """
     found, total, count = ws.contacts.found, 0.0, end - begin
     middle = pressed = mean = (0.0, 0.0, 0.0)
@@ -121,19 +124,19 @@ def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
     if total > 0.0:
         pressed, mean = divide(pressed, total), divide(mean, total)
     size = norm(sub(vec(found[begin].point), vec(found[end - 1].point))) / 2
-    a, b, turn = slip_at(s, kin, q, found[known], pressed if total > 0.0 else middle)
+    a, b, turn = slip_at(s, kin, q, found[reference], pressed if total > 0.0 else middle)
     if not abs(a) + abs(b) + size * abs(turn) > STILL:
         return False
-    if math.sqrt(a * a + b * b) < FAR * size * abs(turn):
+    if math.sqrt(a * a + b * b) < FAR_CENTER * size * abs(turn):
         center, face = measure_face(s, ws.contacts, kin, begin, end, middle)
         if not total > 0.0:
             pressed = center
-        slip, arm = slip_at(s, kin, q, found[known], pressed), sub(pressed, center)
+        slip, arm = slip_at(s, kin, q, found[reference], pressed), sub(pressed, center)
         x, y = dot(vec(found[begin].tangents[0]), arm), dot(vec(found[begin].tangents[1]), arm)
         part = pressed_part(ws.contacts, count, face, x, y)
-        slow = h * found[known].friction * norm(vec(s.gravity))
+        slow = h * found[reference].friction * norm(vec(s.gravity))
         if part[0] > POINTLIKE and (h == 0.0 or is_steady(
-                found[known], pressed, slip, part[0] * size, slow)):
+                found[reference], pressed, slip, part[0] * size, slow)):
             return turn_about(ws.contacts, begin, end, center, face, part, (x, y),
                               (x - slip[1] / slip[2], y + slip[0] / slip[2]))
     changed = False

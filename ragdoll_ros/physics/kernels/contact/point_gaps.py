@@ -54,8 +54,8 @@ def find_manifold(s: System, kin: Kinematics, k: int, manifold: np.ndarray) -> i
 
 @compiled
 def points_at_start(ws: Workspace, k: int) -> tuple[int, int]:
-    """Index in contacts.points of the first point of pair k as the step began, and of the first
-    that is not.
+    """Range begin, end (end excluded) in contacts.points of the points that pair k had as the step
+    began; only of a pair that had some, whose first_point is not NONE.
     """
     begin, count = ws.contacts.first_point[k], ws.step.scalars[0].start_point_count
     end = begin
@@ -66,7 +66,9 @@ def points_at_start(ws: Workspace, k: int) -> tuple[int, int]:
 
 @compiled
 def find_point(ws: Workspace, k: int, feature_id: int) -> int:
-    """Index in contacts.points of a point of pair k, NONE if it has no gap."""
+    """Index in contacts.points of the tracked point of pair k with this feature id; NONE if it is
+    not tracked.
+    """
     contacts, count = ws.contacts, ws.gap_counts[0].live - ws.gap_counts[0].fixed
     begin, end = points_at_start(ws, k)
     for i in range(begin, end):
@@ -134,8 +136,10 @@ def approach_speed(s: System, kin: Kinematics, q: np.ndarray, k: int, at: np.rec
 def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, h: float,
                       out: np.ndarray) -> None:
     """Write the gaps of pairs that touched as the step began, and of their points, at the end of a
-    trial of h s, to ``out``; after update_gaps(). Points that are not found are farther than FAR,
-    and at internal edges none counts. ``kin``: of the end, with its geoms.
+    trial of h s, to ``out``; after update_gaps(). ``kin``: of the end, with its geoms.
+
+    Points that the manifold at the end lacks get FAR; so do all points of a pair that touches at
+    an internal edge alone. Points that touch and are not tracked yet are added.
     """
     counts, contacts = ws.gap_counts[0], ws.contacts
     first = counts.fixed - len(s.pairs)

@@ -18,7 +18,10 @@ from .kinematics import Kinematics, linear
 
 @compiled
 def composite_inertias(tree: np.ndarray, kin: Kinematics, composite: np.ndarray) -> None:
-    """Write the inertias of all subtrees to ``composite`` (n,); after rotate_inertias()."""
+    """Write the composite-rigid-body inertia of each body's subtree to ``composite`` (n,), about
+    its doll's root, world axes: mass, kg, first moment m c, kg m, and inertia xx, xy, xz, yy, yz,
+    zz, kg m^2. After rotate_inertias().
+    """
     for i in range(len(tree)):
         m, own, row = tree[i].mass, kin.inertias[i], composite[i]
         x, y, z = vec(kin.positions[i])

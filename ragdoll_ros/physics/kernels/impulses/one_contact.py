@@ -15,8 +15,9 @@ MAX_ITERATIONS = 50
 
 @compiled
 def solve_one_contact(W: np.ndarray, n: int, a: int, c: Vec3, guess: Vec3, mu: float) -> Vec3:
-    """Impulse of the contact whose rows of W (flat, n a row) begin at a, and whose velocity without
-    it is c; friction coefficient mu. ``guess``: an impulse to start from.
+    """Impulse, N s, of the contact whose rows of W (flat, n a row), normal and two tangents, begin
+    at a, and whose velocity without it is c, m/s; friction coefficient mu. ``guess``: an impulse to
+    start from.
 
     A sliding contact has u_t = -d p_t with a drag d > 0, and u_n = 0: linear for given d. Sought
     is the d at which |p_t| = mu p_n. It exists, as d = 0 gives more (else the contact would stick)

@@ -136,8 +136,10 @@ def add_curvature_bias(island: Island, m: int, n: int) -> None:
 
 @compiled
 def mask_singular_rows(W: np.ndarray, n: int, b: np.ndarray) -> None:
-    """Decouple rows in which joints let no body move, and zero their b: their W is zero, and would
-    be divided by.
+    """Decouple rows in which joints let no body move: their diagonal of W is zero.
+
+    Rows whose diagonal of W (n, n), flat, is at most SINGULAR times the largest lose their
+    off-diagonal elements, get the largest as diagonal, and b = 0, so that their impulse is zero.
     """
     most = 0.0
     for i in range(n):

@@ -97,7 +97,9 @@ def solve_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: 
 @compiled
 def collect_island(ws: Workspace, begin: int, m: int, number: int) -> tuple[int, int]:
     """Write the contacts of island ``number`` from found[begin] on to island.members, and number
-    their rows. Returns how many there are of each; those without room are counted and left out.
+    their rows. Returns the numbers of contacts and of rows that were written; those for which
+    there is no room are counted in stats.contacts_dropped. Marks all of them as done: their
+    ``island`` becomes -1 - number.
     """
     count = rows = 0
     for i in range(begin, m):
@@ -120,7 +122,9 @@ def collect_island(ws: Workspace, begin: int, m: int, number: int) -> tuple[int,
 
 @compiled
 def count_solve(s: System, ws: Workspace, number: int, count: int, rows: int) -> None:
-    """Enter the solve of island ``number``, of so many contacts and rows, in the ledger."""
+    """Add the contacts, rows, degrees of freedom and Newton steps of the solve of island ``number``
+    to the counters of stats.ledger, and set its number of Newton steps back to 0.
+    """
     ledger, island = ws.stats[0].ledger, ws.island
     ledger.solves += 1
     ledger.contacts += count

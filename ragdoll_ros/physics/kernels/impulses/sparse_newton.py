@@ -244,8 +244,8 @@ def multiply_rows(island: Island, k: int) -> None:
 
 @compiled
 def solve_for_z(island: Island, dofs: int) -> bool:
-    """Solve for dz, into island.z_direction, by places, after multiply_rows() of all members.
-    Returns whether the matrix is regular.
+    """Solve for the step dz = Y^T dp, after multiply_rows() of all members, and write it to
+    island.z_direction in order of elimination. Returns whether the matrix is regular.
     """
     lu, Y, dz = island.lu, island.Y, island.z_direction
     for i in range(dofs):
@@ -334,8 +334,11 @@ def take_step(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
 @compiled
 def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
                   dofs: int) -> float:
-    """Take Newton steps from p, which becomes the best found. Returns its residual, m/s; island.z
-    becomes Y^T p. ``dofs``: from find_sparsity().
+    """Solve a large island for its impulses p (n,), N s: at most SPARSE_STEPS Newton steps from the
+    given p, until the residual is at most ``tolerance``, m/s. p becomes the best found.
+
+    b (n,): velocities of the rows without impulses, m/s. ``dofs``: from find_sparsity(). Writes
+    Y^T p to island.z. Returns the residual of the best p, m/s.
     """
     island, keep = ws.island, ws.island.best
     best, late, proximal, before = math.inf, 0, MOST_PROXIMAL, math.inf

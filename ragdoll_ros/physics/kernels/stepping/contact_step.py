@@ -29,10 +29,10 @@ from ..impulses.solver import UNSOLVED
 from ..system import NO_SLIP, System
 from ..workspace import Workspace
 from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
-from .impact import is_approaching
+from .impact import closes_fast
 from .position_correction import (clip_to_joint_limits, correction_energy, write_correction_bounds,
                                   limit_correction_energy)
-from .springs import add_implicit_stiffness, add_spring_force, saturate_springs, theta_weight
+from .springs import add_implicit_spring, add_spring_force, saturate_springs, theta_weight
 from .warm_start import warm_start
 from .work import account_kinematic_work, account_work, load_potential
 
@@ -74,7 +74,7 @@ def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
         return False
     for i in range(ws.step.scalars[0].start_contact_count):
         c = ws.contacts.start[i]
-        if is_approaching(c) and not (
+        if closes_fast(c) and not (
                 had_met(s, cluster.contacts, ws.stats[0].contact_count, c.id)):
             return True
     return False
@@ -199,13 +199,15 @@ def implicit_mass_matrix(s: System, ws: Workspace, springs: np.ndarray, h: float
             stiffness = passive_torque(body, d, ws.step.q_middle[body.q_start + d])[1]
             dyn.H[body.v_start + d, body.v_start + d] += h * stiffness * h / 4
     for k in range(len(springs)):
-        add_implicit_stiffness(s, kin, dyn.H, springs[k], h)
+        add_implicit_spring(s, kin, dyn.H, springs[k], h)
     factor_ltl(dyn.H, s.dof_parent)
 
 
 @compiled
 def add_passive_torques(tree: np.ndarray, q: np.ndarray, out: np.ndarray) -> None:
-    """Add the passive torques of all joints at q to ``out`` (nv,)."""
+    """Add the elastic torques of tissue near the ends of joint ranges, N m, at q to ``out``
+    (nv,). Joints without ``passive`` have none.
+    """
     for i in range(len(tree)):
         body = tree[i]
         for d in range(body.dof_count if body.has_passive else 0):

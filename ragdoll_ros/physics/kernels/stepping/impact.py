@@ -27,8 +27,10 @@ TOLERANCE = 1e-10
 
 
 @compiled
-def is_approaching(c: np.record) -> bool:
-    """Whether a contact with start_velocity closes so fast that it is an impact."""
+def closes_fast(c: np.record) -> bool:
+    """Whether a contact closes so fast, by its start_velocity, that it is an impact: faster than
+    SLOW, m/s; a joint limit than SLOW_TURN, rad/s.
+    """
     return c.start_velocity[0] < -(SLOW_TURN if c.kind == LIMIT else SLOW)
 
 
@@ -42,7 +44,7 @@ def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m
     for i in range(m):
         if contacts[i].gap > MET:
             contact_velocities(s, kin, cluster.q, cluster.v, contacts[i])
-            if not (contacts[i].gap <= landed and is_approaching(contacts[i])) and not (
+            if not (contacts[i].gap <= landed and closes_fast(contacts[i])) and not (
                     had_met(s, cluster.contacts, known, contacts[i].id)):
                 continue
         contacts[count] = contacts[i]

@@ -48,7 +48,7 @@ def local_error(cluster: ClusterState, v_end: np.ndarray, h: float) -> float:
 
 @compiled
 def allowed_error(nominal: float) -> float:
-    """Error, m or rad, that a step may have that is longer than ``nominal`` s."""
+    """Local error, m or rad, allowed to a step that is longer than the nominal ``nominal`` s."""
     return nominal * nominal / 12 * QUIET
 
 

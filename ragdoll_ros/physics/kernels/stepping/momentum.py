@@ -273,7 +273,9 @@ def remove_energy(s: System, ws: Workspace, gained: float, q: np.ndarray, v: np.
 
 @compiled
 def locked_angular_velocity(ws: Workspace, doll: np.record, angular_momentum: Vec3) -> Vec3:
-    """Angular velocity, rad/s, of a doll with this angular momentum and all joints locked."""
+    """Angular velocity, rad/s, that a doll with all joints locked has with this angular momentum
+    about its center of mass. Overwrites step.spin and step.dynamics.matrix.
+    """
     matrix, spin = ws.step.dynamics.matrix, ws.step.spin
     for j in range(3):
         for k in range(3):

@@ -38,9 +38,10 @@ def correction_energy(s: System, ws: Workspace, kin: Kinematics, correction: np.
 @compiled
 def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.ndarray) -> None:
     """Scale a displacement ``correction`` (nv,), and its scalars.correction_energy, so that this
-    stays below a share of the internal kinetic energy. Deep penetrations into what does not yield
-    or past a limit are corrected at any cost; the excess is added to
-    stats.work_position_correction.
+    stays below the share PAID_SHARE of the internal kinetic energy.
+
+    If one of m contacts is deep, with the world, with a kinematic body or past a joint limit, the
+    displacement stays whole, and the excess, J, is added to stats.work_position_correction.
     """
     is_deep, scalars = False, ws.step.scalars[0]
     for i in range(m):
@@ -62,8 +63,9 @@ def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.nda
 @compiled
 def write_correction_bounds(s: System, kin: Kinematics, q: np.ndarray, correction: np.ndarray,
                             motion: np.ndarray) -> None:
-    """Write by how much a displacement ``correction`` (nv,) moves, m, and turns, rad, each body to
-    motion[].correction and correction_angle. ``kin`` is that of q; its velocities are overwritten.
+    """Write the distance, m, and angle, rad, by which a displacement ``correction`` (nv,) moves
+    each body i to motion[i].correction and correction_angle: bounds for the update of gaps.
+    ``kin`` is that of q; its velocities are overwritten.
     """
     some = False
     for j in range(len(correction)):

@@ -46,10 +46,10 @@ def spring_jacobian(axis: np.ndarray, spring: np.record, arm: Vec3) -> Vec3:
 
 
 @compiled
-def add_implicit_stiffness(s: System, kin: Kinematics, H: np.ndarray, spring: np.record,
-                           h: float) -> None:
-    """Add the implicit stiffness and damping of a spring in a step of h s to H, h
-    implicit_damping() J^T J: for a grab h (k h / 4 + c / 2) J^T J, nothing where it is saturated.
+def add_implicit_spring(s: System, kin: Kinematics, H: np.ndarray, spring: np.record,
+                        h: float) -> None:
+    """Add the implicit stiffness and damping of a spring in a step of h s to H:
+    h implicit_damping() J^T J, of a grab h (k h / 4 + c / 2) J^T J; nothing if it is saturated.
     The degrees of freedom of a body are on one path to the root, so H keeps its sparsity.
     """
     i = spring.body
@@ -72,10 +72,11 @@ def add_implicit_stiffness(s: System, kin: Kinematics, H: np.ndarray, spring: np
 @compiled
 def spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, spring: np.record,
                  time: float) -> tuple[Vec3, Vec3]:
-    """Force, N, of a spring at q and v, and the velocity, m/s, of its point; of an angular drive
-    torque, N m, and angular velocity, rad/s; of a joint spring the same, in the first entries.
+    """Force, N, of a spring at q and v, and velocity, m/s, of the point that it acts on; world.
 
-    ``kin`` is that of q. ``time``: s since the spring's target was at spring.target.
+    Of an angular drive: torque, N m, and angular velocity, rad/s. Of a joint spring: torque and
+    joint rate, as the first entries, the others zero. A saturated spring has its saturated_force.
+    ``kin`` is that of q. ``time``: s since the spring's target was set.
     """
     i = spring.body
     gone = min(time, spring.time_left)

@@ -3,10 +3,10 @@
 Geoms that are apart when a step begins may meet before it ends. A length at which nothing has met
 and one at which something has bracket the time of impact, which is approached by regula falsi with
 Anderson and Bjoerck's weights (BIT 13, 1973), and by bisection where that lags, as between two gaps
-of which one is not straight. The first length ends where a joint is at its limit at its rate; the
-second is along a parabola through the gap at the trial's middle, where the velocities are those of
-the start. The loop that tries the lengths is step_control.step_to_impact(); in flight,
-flight/first_contact.py.
+of which one is not straight. The first trial is the whole step, or ends where a joint would reach
+its limit at its present rate. The second ends at the root of the parabola through the gaps at the
+start, middle and end of the first. The loop that tries the lengths is
+step_control.step_to_impact(); in flight, flight/first_contact.py.
 """
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ OVERSHOT = -1e-7
 """m or rad: a gap that is less at a step's end has closed on the way."""
 
 LANDED, AIM = 1e-6, 2e-7
-"""m or rad: a gap that closes fast is sought until it is between OVERSHOT and the first; trials are
-to end at the second, so that those a little long or short end there as well."""
+"""m or rad: the impact of a gap that closes fast is found when OVERSHOT <= gap <= LANDED. Trials
+aim at a gap of AIM, so that those a little long or short are within these bounds as well."""
 
 SHORTEST = 1e-9
 """s: no step is made shorter to find an impact."""
@@ -102,8 +102,9 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
 
 @compiled
 def anderson_bjorck_weight(before: float, now: float) -> float:
-    """Weight of the far end of a chord when the near end moves from ``before`` to ``now``, of the
-    same sign; one half where that is not positive.
+    """Factor of the function's value at the end of the bracket that stays, when the value at the
+    other end changes from ``before`` to ``now``: 1 - now/before, or one half where that is not
+    positive or the signs differ.
     """
     share = 1 - now / before if before != 0.0 and (now < 0) == (before < 0) else 0.5
     return share if share > 0 else 0.5

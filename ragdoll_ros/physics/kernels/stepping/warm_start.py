@@ -13,7 +13,7 @@ from ..impulses.solve_contacts import SEPARATING
 from ..maths.vectors import norm, vec
 from ..system import System
 from ..workspace import Workspace
-from .impact import is_approaching
+from .impact import closes_fast
 
 JAMMED = 10.0
 """Factor on all momenta and weights above which impulses are those of a jam."""
@@ -63,7 +63,7 @@ def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) ->
                 c.impulse[e] = ws.contacts.tried[t].impulse[e]
         k = find_id(ws.contacts.start, start_count, c.id, k)
         c.persistent = 1 if k < start_count and not (
-            is_new and is_approaching(ws.contacts.start[k])) else 0
+            is_new and closes_fast(ws.contacts.start[k])) else 0
         if c.persistent:
             take_start(c, ws.contacts.start[k])
 

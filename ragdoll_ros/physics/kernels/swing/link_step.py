@@ -154,7 +154,11 @@ def root_forces(link: np.ndarray, r: np.ndarray, state: np.ndarray,
 @compiled
 def step_link(link: np.ndarray, r: np.ndarray, state: np.ndarray, frame: Frame,
               forces: tuple[Vec3, Vec3]) -> None:
-    """Integrate a link over one step; ``frame``: at its root at the end; ``r``: its response."""
+    """Advance ``state`` (LINK_STATE) by one step, in place.
+
+    ``r`` (RESPONSE): coefficients of the link's motion over a step of this length; ``frame``: at
+    its root at the end; ``forces``: at both ends, 1/s^2, see root_forces().
+    """
     start, end = forces
     d, rate = vec(state.direction), vec(state.rate)
     to_rest, drift = vec(state.to_rest), vec(state.drift)
@@ -170,8 +174,8 @@ def step_link(link: np.ndarray, r: np.ndarray, state: np.ndarray, frame: Frame,
         add(add_scaled(scale(r.v_rest, to_rest), r.v_rate, rate),
             add_scaled(scale(r.v_frame, frame_turn), r.v_drift, drift)),
         add_scaled(scale(r.v_start, start), -r.end_rest, left)))
-    d, lost = exp_map(d, x)
-    v, left = transported(v, x, lost), transported(left, x, lost)
+    d, chord = exp_map(d, x)
+    v, left = transported(v, x, chord), transported(left, x, chord)
     place(link, state, frame, d)
     v = add(v, add_scaled(scale(r.end_rest, vec(state.to_rest)), r.end_drift, vec(state.drift)))
     if link.stiffness > 0:

@@ -26,7 +26,7 @@ def log_map(d: Vec3, target: Vec3) -> Vec3:
 @compiled
 def exp_map(d: Vec3, x: Vec3) -> tuple[Vec3, Vec3]:
     """Exponential map of a tangent ``x`` at ``d``: the new direction, of unit length to rounding,
-    and what transported() needs.
+    and the chord of transported(), (d + end) scaled so that transport takes (x v) chord off v.
     """
     half = math.sqrt(dot(x, x)) / 2 + SMALLEST
     sin, cos = sine_and_cosine(half)
@@ -37,6 +37,8 @@ def exp_map(d: Vec3, x: Vec3) -> tuple[Vec3, Vec3]:
 
 
 @compiled
-def transported(v: Vec3, x: Vec3, lost: Vec3) -> Vec3:
-    """Parallel transport of a tangent ``v`` along ``x``; ``lost``: see exp_map()."""
-    return add_scaled(v, -dot(x, v), lost)
+def transported(v: Vec3, x: Vec3, chord: Vec3) -> Vec3:
+    """Parallel transport of a tangent ``v`` at d along the geodesic of exp_map(d, x), whose second
+    value is ``chord``.
+    """
+    return add_scaled(v, -dot(x, v), chord)

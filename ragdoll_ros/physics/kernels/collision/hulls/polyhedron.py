@@ -25,7 +25,9 @@ INSIDE = 1e-12
 
 @compiled
 def hull_support(system: int, hull: int, d: Vec3) -> Vec3:
-    """The vertex, m, that is farthest along d."""
+    """Vertex of a hull that is farthest along d, of any length, m, in its own frame. ``system``:
+    address of the System.
+    """
     s = system_at(system)
     return vec(s.hull_vertices[supporting_vertex(s, hull, d)].point)
 

@@ -70,9 +70,10 @@ def core_radius(a: Shape) -> float:
 
 
 @compiled
-def hull_bounds(a: Shape, t: Shape) -> tuple[float, float]:
-    """How far, m, a hull is from the plane of a triangle, on the side of its center; and from the
-    triangle in its plane.
+def triangle_lower_bounds(a: Shape, t: Shape) -> tuple[float, float]:
+    """Two lower bounds, m, of the distance of the core of a from a triangle t: the separation along
+    the triangle's normal on a's side, and the largest along the outward normals of its edges in
+    its plane.
     """
     corners, c, normal = corners_of(t), sub(a.position, t.position), column(t.rotation, 2)
     outward = outward_vectors(edge_vectors(corners), normal)
@@ -84,9 +85,12 @@ def hull_bounds(a: Shape, t: Shape) -> tuple[float, float]:
 
 @compiled
 def edge_direction(a: Shape, c: Vec3, corner: Vec3, edge: Vec3, turn: int) -> Vec3:
-    """Candidate number ``turn`` between an edge of the triangle and a's core, perpendicular to the
-    edge, of any length: across it and an edge or the axis of a, and of all but boxes and hulls
-    towards the ends of the axis.
+    """Candidate axis number ``turn`` of an edge of the triangle and a's core, perpendicular to the
+    edge, of any length.
+
+    Box, hull: edge x edge ``turn`` of a. Others: 0: edge x axis of a; 1, 2: from the edge to an end
+    of the axis. ``edge``: unit vector from ``corner``; ``c``, ``corner``: a's center and the
+    corner from the triangle's center, m.
     """
     if a.kind == HULL:
         return cross(edge, to_world(a.rotation, edge_vector(a.system, a.hull, turn)))
@@ -198,7 +202,7 @@ def triangle_separation(a: Shape, t: Shape, cutoff: float) -> float:
     hull that is farther away than ``cutoff``, m, a lower bound.
     """
     if a.kind == HULL:
-        height, beside = hull_bounds(a, t)
+        height, beside = triangle_lower_bounds(a, t)
         if max(height, beside - REACH) > cutoff:
             return max(height, beside - REACH)
     found, radius = limited_axis(a, t), core_radius(a)

@@ -19,8 +19,8 @@ from ..features import (FEATURE_SINE, MAX_CORNERS, corner_id, face_cosine, face_
 from ..manifold import CLIP_VERTEX, merge_points, reduce_points, sort_points
 from ..separating_axis import FACE_BIAS, FACE_BIAS_RATIO
 from ..shapes import BOX, CAPSULE, HULL, SPHERE, Shape, bounding_radius
-from .limited_axis import (FACE, FIRST_CORNER, LimitedAxis, core_radius, hull_bounds, is_beside,
-                           is_contact_axis, limited_axis)
+from .limited_axis import (FACE, FIRST_CORNER, LimitedAxis, core_radius, is_beside,
+                           is_contact_axis, limited_axis, triangle_lower_bounds)
 from .triangle import FLAT, Corners, corners_of, edge_vectors, supporting_corner
 
 WIDER = 1 + 1e-9
@@ -41,7 +41,7 @@ FACE_IDS, REFERENCE_IDS, CLOSEST_ID = ON_FACE, ON_FACE + 1024, ON_FACE + 2048
 def triangle_manifold(a: Shape, t: Shape, margin: float, manifold: np.ndarray) -> int:
     """Write the manifold of a shape and a triangle; arguments and return value as collide()."""
     if a.kind == HULL:
-        height, beside = hull_bounds(a, t)
+        height, beside = triangle_lower_bounds(a, t)
         if max(height, beside - OVERLAP) > margin:
             return 0
     found, radius = limited_axis(a, t), core_radius(a)
@@ -101,7 +101,7 @@ def a_edge(a: Shape, arm: Vec3, n: Vec3) -> tuple[Vec3, Vec3]:
 
 @compiled
 def triangle_edge(corners: Corners, feature: int) -> tuple[Vec3, Vec3]:
-    """Middle, m, and half vector of an edge of a triangle; the half of a corner is 0."""
+    """Midpoint and half vector, m, of an edge, feature 0 to 2; of a corner the corner and 0."""
     if feature >= FIRST_CORNER:
         return corners[feature - FIRST_CORNER], (0.0, 0.0, 0.0)
     begin, end = corners[feature], corners[(feature + 1) % 3]
@@ -189,8 +189,10 @@ def goes_on(edges: Vec3, side: int) -> bool:
 
 @compiled
 def clip_triangle(a: Shape, arm: Vec3, corners: Corners, n: Vec3, scratch: np.ndarray) -> int:
-    """Clip the triangle by the face of a, a box or cylinder, that supports against n. Writes the
-    points to ``scratch`` from MAX_CLIPPED on. Returns their number.
+    """Clip the triangle by the face of a, a box, cylinder or hull, that is farthest along -n.
+
+    Coordinates are relative to the triangle's center; ``arm``: a's center. Writes the points to
+    ``scratch`` from MAX_CLIPPED on. Returns their number.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
     sides = scratch[2 * MAX_CLIPPED:2 * MAX_CLIPPED + MAX_CORNERS]
