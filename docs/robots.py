@@ -36,9 +36,11 @@ MANY = 500
 HEAD = """# Robots that were fitted
 
 What [`ragdoll_fit`](fit.md#a-robots-urdf) makes of every URDF of some packages on PyPI: the root,
-how many bodies, mass, how many warnings the report has, and its [verdict](fit.md#the-verdict);
-then, dropped from 0.4 m by the engine `rigid`, the processor time of a tick in the first second,
-and after how long it sleeps. For what is refused, the sentence, and whether PyBullet loads it.
+the number of bodies, the mass, the number of warnings in the report, and the
+[verdict](fit.md#the-verdict). Each doll is then dropped from 0.4 m with the engine `rigid`: the
+last columns are the processor time of a tick in the first second, and the time after which the doll
+sleeps (`no`: it is awake after 10 s). For a file that is refused, the row has the error message,
+and whether PyBullet loads the file.
 Written by `docs/robots.py`.
 """
 

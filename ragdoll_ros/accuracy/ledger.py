@@ -108,7 +108,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('scenes', nargs='*', default=SCENES, metavar='SCENE',
                         help='name of a shipped scene, or a file')
     parser.add_argument('--accuracy', choices=list(ACCURACIES), default='draft')
-    parser.add_argument('--seconds', type=float, default=2.5, help='simulated; 2.5 by default')
+    parser.add_argument('--seconds', type=float, default=2.5,
+                        help='simulated time, s (default: 2.5)')
     options = parser.parse_args(arguments)
     if not 0 < options.seconds <= 1000:
         parser.error(f'--seconds {options.seconds}: expected a number above 0, up to 1000')

@@ -83,7 +83,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--ray', nargs='?', const=cluster.LOCAL, metavar='ADDRESS',
                         help='use the Ray cluster at ADDRESS, or a local Ray instance')
     parser.add_argument('--resume', action='store_true',
-                        help='keep the complete shards in the folder, make the rest')
+                        help='keep the complete shards (parts of the data set) in the folder, and '
+                        'make the rest')
     return parser
 
 

@@ -1,4 +1,4 @@
-"""Describe a data set: a page and pictures, compared with published figures of real falls."""
+"""Describe a data set by a page and pictures, compared with published figures of real falls."""
 import argparse
 import sys
 from pathlib import Path

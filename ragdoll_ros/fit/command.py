@@ -25,7 +25,7 @@ example:
   ragdoll_fit character.glb -o doll.yaml --picture doll.png
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=doll.yaml
 
-A .urdf or .sdf becomes a doll too: a robot without motor torques; so does a .xacro, where xacro is
+A .urdf or .sdf becomes a doll too: the robot with its motors off; so does a .xacro, where xacro is
 installed. A .yaml with a doll or a scene is checked and reported.
 If the file has several characters or robots, each becomes a doll: DOLL.yaml is a scene with all of
 them in place; DOLL.urdf and OUT.png get _1, _2, ... before the suffix.
@@ -63,20 +63,22 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         'ragdoll_fit', description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('input', help='a .glb, .gltf or .vrm with a skinned character, a .urdf, '
-                        '.xacro or .sdf, a .yaml')
+    parser.add_argument('input', help='a .glb, .gltf or .vrm with a skinned character; the '
+                        '.urdf, .xacro or .sdf of a robot; or the .yaml of a doll or scene, which '
+                        'is only checked')
     parser.add_argument('-o', '--output', metavar='DOLL.yaml', help='write the doll to this file')
     parser.add_argument('--urdf', metavar='DOLL.urdf', help='write the doll as URDF too')
     parser.add_argument('--dialect', choices=('ros', 'bullet'), default='ros',
-                        help='of that URDF; bullet: with <capsule>, and with links without mass '
-                        'marked as PyBullet requires')
+                        help='dialect of that URDF (default: ros); bullet: with <capsule>, and '
+                        'with links without mass marked as PyBullet requires')
     parser.add_argument('--picture', metavar='OUT.png',
                         help='draw skin, bodies, joints and joint ranges side by side')
     parser.add_argument('--mass', type=float, metavar='KG',
                         help="mass of each doll (default: the skin's volume of water)")
     parser.add_argument('--masses', choices=('best', 'volume', 'proportions'), default='best',
-                        help="distribute the mass by the skin's volume, by a person's proportions, "
-                        'or by volume and, for a person, their geometric mean (default)')
+                        help="how to distribute the mass: by the skin's volume; by a person's "
+                        'proportions; or (best, the default) by volume and, for a person, by the '
+                        'geometric mean of both')
     parser.add_argument('--scale', type=float, metavar='M',
                         help='metres per unit of the file (default: 1, or an estimate)')
     parser.add_argument('--shape', default='best',
@@ -89,16 +91,17 @@ def _parser() -> argparse.ArgumentParser:
                         '(default: to the bone with the largest weight)')
     parser.add_argument('--smallest', type=float, metavar='M',
                         help='merge bones with a smaller skin into their parents (default: 0.055 '
-                        'of the character; 0: merge none, keep fingers)')
+                        "of the character's extent; 0: merge none, keep fingers)")
     parser.add_argument('--keep', nargs='+', action='extend', default=[], metavar='BONE',
                         help='bones that become bodies whatever their size: names as in the '
                         "report, or patterns such as '*Thumb*'")
     parser.add_argument('--animation', nargs='+', action='extend', default=[], metavar='MOVE.bvh',
-                        help='report how well the doll can follow this motion capture too, by '
-                        'which a scene can move it')
+                        help='motion capture by which a scene can move the doll: also report how '
+                        'well the doll can follow it')
     parser.add_argument('--tree', choices=TREES, default='auto',
-                        help="whose tree of bones: the file's where a joint lies in or near both "
-                        "bodies, else the skin's (default); all of the file's; or the skin's alone")
+                        help="tree of bones: the file's where a joint lies in or near both bodies, "
+                        "else the skin's (auto, the default); all of the file's; or the skin's "
+                        'alone')
     parser.add_argument('--root', metavar='BONE',
                         help='the bone that becomes the root (default: found in the trunk)')
     parser.add_argument('--strict', action='store_true',

@@ -16,7 +16,8 @@ examples:
   ragdoll_person --sex female --passive -o soft_joints.yaml
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=person.yaml
 
-Masses, centres and inertias are de Leva's of 1996 (J Biomech 29:1223); the percentiles ANSUR II's.
+Masses, centres of mass and inertias are those of de Leva 1996 (J Biomech 29:1223), the percentiles
+those of ANSUR II.
 Exit code 0: done; 2: an option is wrong, or the file cannot be written."""
 
 HEAD = """\
@@ -54,7 +55,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         'ragdoll_person', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--sex', choices=SEXES, required=True, help='selects the table')
+    parser.add_argument('--sex', choices=SEXES, required=True,
+                        help='sex, which selects the anthropometric table')
     parser.add_argument('--height', type=float, metavar='M',
                         help="standing height, m, 1.0 to 2.1 (default: the percentile's)")
     parser.add_argument('--mass', type=float, metavar='KG',

@@ -66,9 +66,12 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('bag', type=Path, help='a folder of `ros2 bag record` with ~/events and '
                         '~/scene, or a .mcap or .db3 file')
-    parser.add_argument('--node', help='the node, if a bag has several: /east/ragdoll')
-    parser.add_argument('--engine', choices=ENGINES, help='compare with this engine')
-    parser.add_argument('--accuracy', choices=ACCURACIES, help='compare with this accuracy')
+    parser.add_argument('--node', help='full name of the node, such as /east/ragdoll, if a bag '
+                        'has several')
+    parser.add_argument('--engine', choices=ENGINES, help='repeat the run with this engine, and '
+                        'compare')
+    parser.add_argument('--accuracy', choices=ACCURACIES, help='repeat the run with this '
+                        'accuracy, and compare')
     parser.add_argument('--save', metavar='FILE', type=Path, action='append', default=[],
                         help='write the run, or the recorded poses, as an animation (.glb: glTF, '
                         '.bvh), a table (.csv), or poses for ragdoll_viewer --play (.mcap); '

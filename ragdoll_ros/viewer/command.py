@@ -120,14 +120,14 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--static', metavar='FOLDER', help='do not serve: write the fall of '
                         '--scene, or the run of --play, as FOLDER/index.html, which a browser '
                         'shows from any web server or from disk')
-    parser.add_argument('--engine', choices=ENGINES, help='physics engine of --scene (auto); a '
-                        'node has a parameter for it')
+    parser.add_argument('--engine', choices=ENGINES, help='physics engine of --scene (auto); for '
+                        'a node, set its parameter `engine`')
     parser.add_argument('--host', default=HOST, help='address to serve at (%(default)s: this '
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
     parser.add_argument('--port', type=port, help=f'port ({PORT}, or the next free one)')
     parser.add_argument('--start-after', type=seconds, metavar='S', help='resume a node that was '
-                        'started with start_paused once a page shows it, or after S seconds '
-                        'without a page; the first page then begins again')
+                        'started with start_paused when a page shows it, or after S seconds '
+                        'without a page; then the first page starts the scene again')
     parser.add_argument('--folder', help='where the page saves and loads scenes and uploaded '
                         f'characters (~/{DEFAULT_FOLDER}, created if missing); pages can write '
                         'nowhere else')

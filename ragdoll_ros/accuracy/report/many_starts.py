@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--starts', type=int, default=STARTS_PER_CLASS, metavar='N',
                         help=f'starts of each of the nine classes ({STARTS_PER_CLASS})')
     parser.add_argument('--accuracy', action='append', choices=list(ACCURACIES),
-                        help='may be given again (normal)')
+                        help='repeatable (normal)')
     parser.add_argument('--out', type=Path, default=Path('docs/starts'), metavar='DIR',
                         help='folder to write into (docs/starts)')
     options = parser.parse_args(arguments)

@@ -33,7 +33,7 @@ class NodeSettings:
     """Values of all parameters that can be set; see the descriptions."""
 
     scene: str = _parameter(
-        'drop', 'Scene to simulate: a name in config/ or a path; a doll stands above the ground',
+        'drop', 'Scene to simulate: a name in config/ or a path; a doll is put above the ground',
         constraints='a file or the name of a shipped one; setting it again reloads it')
     rate: float = _parameter(
         100.0, 'Ticks and messages per second of simulated time, Hz',
@@ -43,7 +43,8 @@ class NodeSettings:
         scene_default=lambda scene: min(max(scene.pace, 0.001), 100.0))
     start_paused: bool = _parameter(False, 'Start paused, until ~/pause resumes')
     pushed_bone: str = _parameter(
-        '', 'Bone that ~/force and cmd_vel push', constraints='one of bone_names',
+        '', 'Bone that ~/force, cmd_vel and ~/push in the world frame push',
+        constraints='one of bone_names',
         scene_default=lambda scene: scene.first_pushed_bone)
     push_timeout: float = _parameter(
         0.1, 'Simulated time that a push acts unless the next one comes first, s', (0.001, 60.0))
@@ -57,7 +58,7 @@ class NodeSettings:
     torque_per_speed: float = _parameter(
         TORQUE_PER_SPEED, 'Torque per angular velocity error, N m/(rad/s)', (0.0, 1e4))
     max_force: float = _parameter(
-        10000.0, 'Largest force, N, and ten times the largest torque, N m; input is clamped to it',
+        10000.0, 'Largest force, N; the largest torque is 0.1 m times that; input is clamped',
         (0.0, 1e5))
     frame_id: str = _parameter(WORLD, 'Name of the world frame in all messages',
                                constraints='not in bone_names, no leading slash')
@@ -81,7 +82,7 @@ class NodeSettings:
     impact_marker_lifetime: float = _parameter(
         2.0, 'Time for which RViz shows a marker of ~/impacts/markers, s', (0.01, 3600.0))
     body_frames: tuple[str, ...] = _parameter(
-        ('',), "Frames of /tf that bodies with follow, or robots, are moved by: 'body frame'",
+        ('',), "Frames of /tf that move bodies with follow, or robots: each 'body frame'",
         constraints='driven bodies of the scene; an empty string is none')
     imus: tuple[str, ...] = _parameter(
         ('',), 'Bones with an inertial sensor, each published on ~/imu/<bone>/data_raw: '

@@ -1,6 +1,7 @@
-"""Keyboard teleoperation: Up pushes the doll away from you, Down toward you, Left and Right.
+"""Keyboard teleoperation: the arrow keys push the doll.
 
-You look at the doll's face, from +x along -x. A push is 2000 N: a tap gives the doll about 1 m/s.
+You look at the doll's face, from +x along -x: Up pushes it away from you, Down toward you, Left and
+Right as you see them. A push is 2000 N: a tap gives the doll about 1 m/s.
 A held key brings the doll to a top speed, 3 m/s by default, which + and - change; with --force, and
 in the scene `article`, it pushes with 2000 N until its release. Pushes of several keys add up.
 Space pauses and resumes, r resets, q quits.
@@ -238,7 +239,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('node', nargs='?', default='',
                         help='name of the node (default: ragdoll, or the only ragdoll node)')
     parser.add_argument('--top-speed', type=float, default=TOP_SPEED, metavar='M_S',
-                        help=f'm/s that a held key brings the doll to ({TOP_SPEED:g})')
+                        help='speed, m/s, to which a held key accelerates the doll '
+                        f'({TOP_SPEED:g})')
     parser.add_argument('--force', action='store_true',
                         help='a held key pushes with 2000 N until its release, to any speed')
     options = parser.parse_args(remove_ros_args(arguments)[1:])
