@@ -20,8 +20,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the starts and write DIR/accuracy.json and the page; 1 if a criterion is not met."""
     parser = argparse.ArgumentParser(
         prog='python -m ragdoll_ros.accuracy.report.many_starts',
-        description='Simulate 10 008 random starts of the default doll, each until 15 s after its '
-        'end, and check energy gain, limit overshoot, penetration and rest.',
+        description='Simulate 10 008 random starts of the default doll, each until 15 s '
+        'after the end of its trial, and check energy gain, limit overshoot, penetration and rest.',
         epilog='example: python -m ragdoll_ros.accuracy.report.many_starts --starts 20 '
                '--out /tmp/starts')
     parser.add_argument('--starts', type=int, default=STARTS_PER_CLASS, metavar='N',
