@@ -86,52 +86,33 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             pushes, grabs, corrections)
         ledger.trials += 1
         m = contact_step(s, ws, cluster, length, since)
-        if turn < MAX_TRIES - 1 and is_too_long(cluster, step.v_end, length, nominal):
-            ledger.too_coarse += 1
-            length = begin_trials(s, ws, cluster, nominal, nominal)
-            clear_contact_accelerations(cluster)
-            continue
+        too_coarse = is_too_long(cluster, step.v_end, length, nominal)
         start_cycles = cycles()
         finish_step(s, ws, cluster, length, since, m)
         ledger.finish_cycles += cycles() - start_cycles
-        if turn < MAX_TRIES - 1 and is_longer(length, nominal) and any_closed(ws):
-            ledger.too_coarse += 1
-            length = begin_trials(s, ws, cluster, nominal, nominal)
-            clear_contact_accelerations(cluster)
-            continue
+        too_coarse |= is_longer(length, nominal) and any_closed(ws)
         now, speed = total_energy(step.sums_after)
         work = stats.work_pushes - pushes + stats.work_grabs - grabs
         gained = now - held - work
         allowed = tolerated_energy_gain(s, ws, max(moving, speed), work)
         tolerated = allowed + solver_energy(s, ws, m, length)
-        if turn < MAX_TRIES - 1 and length > FINEST * nominal and (
-                not gained - step.scalars[0].correction_energy <= tolerated
-                or penetrates_further(s, ws)):
-            if gained - step.scalars[0].correction_energy <= tolerated:
-                ledger.too_deep += 1
-            else:
-                ledger.too_much_energy += 1
-            length, hit = begin_trials(s, ws, cluster, length / 2, nominal), False
-            stats.next_dt = length
+        may_repeat, shorter = turn < MAX_TRIES - 1, 0.0
+        if may_repeat:
+            gains = not gained - step.scalars[0].correction_energy <= tolerated
+            shorter = shorter_length(s, ws, length, nominal, too_coarse, gains)
+        if shorter > 0:
+            length = begin_trials(s, ws, cluster, shorter, nominal)
             clear_contact_accelerations(cluster)
+            if not too_coarse:
+                stats.next_dt = length
             continue
-        shorter = 1.0
-        if not seek and turn < MAX_TRIES - 1 and length > COARSEST * nominal:
-            shorter = unseen_share(s, ws, UNSEEN_SPEED * nominal)
-        if shorter < 1:
-            ledger.closed_unseen += 1
-            length = max(shorter * length, COARSEST * nominal)
-            length = begin_trials(s, ws, cluster, length, nominal)
-            stats.next_dt = length
-            clear_contact_accelerations(cluster)
-            continue
-        if not seek and turn < MAX_TRIES - 1 and activate_contacts(s, ws, length):
+        if not seek and may_repeat and activate_contacts(s, ws, length):
             ledger.new_contacts += 1
             keep_tried(ws, m)
             continue
         overshot, landed, fast = impacts_at_end(s, ws, length)
         hit = seek and fast
-        if seek and turn < MAX_TRIES - 1 and update_bracket(s, ws, length, overshot, landed):
+        if seek and may_repeat and update_bracket(s, ws, length, overshot, landed):
             if step.bracket[0].halved_width == math.inf:
                 update_middle_gaps(s, ws)
             length = next_trial_step(ws)
@@ -151,6 +132,34 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
     if not seek and len(cluster.impact_log):
         log_impacts(s, ws, cluster, m, True, SLOW, since)
     return length, hit
+
+
+@compiled
+def shorter_length(s: System, ws: Workspace, length: float, nominal: float, too_coarse: bool,
+                   gains: bool) -> float:
+    """Length, s, at which the step of ``length`` s just taken is to be repeated; 0 if it is not.
+
+    The nominal one, if it is longer and ``too_coarse``; half of it, if it ``gains`` energy or
+    penetrates further; where impacts are not sought, the share of it after which no gap is too deep
+    that closed unseen. Counts the reason in stats.ledger.
+    """
+    ledger = ws.stats[0].ledger
+    if too_coarse:
+        ledger.too_coarse += 1
+        return nominal
+    if length > FINEST * nominal:
+        if gains:
+            ledger.too_much_energy += 1
+            return length / 2
+        if penetrates_further(s, ws):
+            ledger.too_deep += 1
+            return length / 2
+    if not ws.step.scalars[0].seeks_impacts and length > COARSEST * nominal:
+        share = unseen_share(s, ws, UNSEEN_SPEED * nominal)
+        if share < 1:
+            ledger.closed_unseen += 1
+            return max(share * length, COARSEST * nominal)
+    return 0.0
 
 
 @compiled
