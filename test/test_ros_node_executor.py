@@ -10,7 +10,7 @@ from geometry_msgs.msg import PoseArray, Vector3, Wrench
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from ragdoll_ros.ros.process.node_executor import NodeExecutor
 
@@ -81,7 +81,8 @@ def test_messages_act_at_the_next_tick(node, peer):
 def test_services_answer_while_it_ticks_and_while_it_is_paused(node, peer):
     assert peer.call(Trigger, 'ragdoll/reset', Trigger.Request()).success
     peer.wait(lambda: node.simulation.time > 0)
-    node.pause(True)
+    # By its service: where this thread paused it, a tick could still be under way.
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True)).success
     before = node.simulation.time
     assert peer.call(Trigger, 'ragdoll/step', Trigger.Request()).success
     assert node.simulation.time == before + node.simulation.tick
