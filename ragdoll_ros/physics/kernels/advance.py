@@ -120,7 +120,7 @@ def all_moved(tree: np.ndarray) -> bool:
 
 @compiled
 def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
-    """Write the gaps at cluster.q to ws.gaps; step.end becomes the kinematics of q and v."""
+    """Write the gaps at cluster.q to ws.gaps; ws.step.end becomes the kinematics of q and v."""
     start_cycles = cycles()
     update_kinematics_and_gaps(s, ws, ws.step.end, cluster.q, cluster.v, ws.gaps, math.inf,
                                ws.gaps)
@@ -237,8 +237,8 @@ def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float,
 
     ``jobs`` (k, 3): addresses of the bundles of system, workspace and state of each. ``step``:
     nominal length of a step in contact, s; ``tolerance``: error of a step of flight, m or rad;
-    ``solve_error``: residual of the contact solve, m/s; ``touching``: gap that counts as contact,
-    m.
+    ``solve_error``: residual of the contact solve as a share of a speed, see Accuracy;
+    ``touching``: gap that counts as contact, m.
     """
     for k in range(len(jobs)):
         system, workspace, cluster = vec(jobs[k])

@@ -113,7 +113,7 @@ def place_links(links: Links, frame: np.ndarray, time: int) -> None:
 
 @compiled
 def rotation_vector(turn: Quat) -> Vec3:
-    """Axis times angle, rad, at most half a turn, of a unit quaternion."""
+    """Rotation vector, rad, of a unit quaternion x, y, z, w; its angle is at most pi."""
     x, y, z, w = turn if turn[3] >= 0 else (-turn[0], -turn[1], -turn[2], -turn[3])
     sine = norm((x, y, z))
     return scale(2 * arc(sine, w) / sine if sine > ROUNDING else 2.0, (x, y, z))

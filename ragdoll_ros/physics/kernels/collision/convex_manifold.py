@@ -172,8 +172,9 @@ def _feature_id(has_hull: bool, face: int, incident_face: int, of_b: int, side: 
 
 @compiled
 def supporting_edges(a: Shape, b: Shape, n: Vec3) -> tuple[Vec3, Vec3, Vec3, Vec3]:
-    """The edges, or lines of sides, of a and b that support along n: their middles, m, from b's
-    center, and half of each.
+    """Supporting edges, or lines on the sides of cylinders, of a along -n and of b along n.
+
+    Returns midpoint and half vector of a's, then of b's, m; midpoints from b's center.
     """
     middle, u = supporting_edge(a, neg(n))
     other, v = supporting_edge(b, n)

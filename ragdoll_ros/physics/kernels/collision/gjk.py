@@ -2,7 +2,7 @@
 
 Gilbert, Johnson, Keerthi, A fast procedure for computing the distance between complex objects in
 three-dimensional space, 1988: the point nearest to the origin of the Minkowski difference, here
-c - scale (b - a), a and b about their centres.
+c - scale (b - a), a and b about their centers.
 """
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ Nearest = tuple[float, Vec3, int]
 @compiled
 def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: float,
                       simplex: np.ndarray, count: int, n: Vec3) -> Direction:
-    """Unit vector from b to a between the closest points of both shapes scaled by ``ratio`` about
-    their centers. So scaled, they must be disjoint. Returns the number of vertices of the last
-    simplex, and the vector.
+    """Number of vertices of the last simplex, and the unit vector from b to a between the closest
+    points of both shapes scaled by ``ratio`` about their centers. So scaled, they must be disjoint.
 
-    c: offset of a's center from b's, m; ``tolerance``: relative error of the distance. It starts
-    with n and the first ``count`` vertices of an earlier ``simplex`` (4,), which is overwritten.
+    c: offset of a's center from b's, m; ``tolerance``: relative error of the distance. The search
+    starts along n with the first ``count`` vertices of an earlier ``simplex`` (4,), which is
+    overwritten.
     """
     square, v = math.inf, n
     for k in range(count):

@@ -1,7 +1,7 @@
 """Separating axes of boxes, cylinders and hulls (and of capsules' axes with them).
 
 Along a unit vector n from b to a two convex shapes are separated by s(n) = c n - h_a(-n) - h_b(n),
-c the offset of a's centre from b's, h their support functions. The largest s over all n is positive
+c the offset of a's center from b's, h their support functions. The largest s over all n is positive
 if and only if they are disjoint, and else minus their penetration depth.
 
 Two boxes: it is along one of 15 axes, face normals and cross products of edges (SAT: Gottschalk,
@@ -9,7 +9,7 @@ Lin, Manocha, OBBTree, 1996). With a cylinder it may also be where a rim meets a
 a hull the faces are tried, and where it overlaps the products of its edges, which are many. Then
 these axes are the start of two searches, both with GJK on disjoint shapes (gjk.py):
 
-- of overlapping shapes the growth distance (Gilbert, Ong, 1994): the scale about their centres at
+- of overlapping shapes the growth distance (Gilbert, Ong, 1994): the scale about their centers at
   which they touch; the axis there is the side to separate them to;
 - separated along n by a small gap, their closest points give a better n. s never decreases, and a
   few of these steps end at a maximum.
@@ -101,8 +101,8 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
 
 @compiled
 def _hull_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -> Axis:
-    """The same where a or b is a hull; products of edges count where they overlap by more than
-    DEEP_RATIO along the best face's normal.
+    """face_or_edge_axis() where a or b is a hull. Edges are tried only if the best face axis
+    overlaps by more than the share DEEP_RATIO. ``cutoff``: for faces only.
     """
     s, axis, bar = -MAX_PENETRATION, (0.0, 0.0, 0.0), -MAX_PENETRATION
     for body in range(2):
@@ -111,7 +111,7 @@ def _hull_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -> Axis:
         local = to_local(own.rotation, towards)
         first, end = _faces(own)
         for k in range(first, end):
-            # The other's centre is within it, so that it is no farther apart than its centre.
+            # The other's center is within it, so that it is no farther apart than its center.
             if own.kind == HULL:
                 normal, offset = hull_plane(own.system, k)
                 if dot(normal, local) - offset <= max(s, bar):

@@ -2,7 +2,7 @@
 
 Kinds and sizes, m: sphere (radius, 0, 0); capsule (radius, half length of its axis, 0); box (half
 extents); cylinder (radius, half length, 0). The axis of a capsule or cylinder is its own z axis.
-These are symmetric about their centre, so that their support functions are even. A hull (radius
+These are symmetric about their center, so that their support functions are even. A hull (radius
 about its centroid, 0, 0) is not: see hulls/polyhedron.py. Nor is a triangle, of a surface, which
 has functions of its own: see triangles/triangle.py. A plane through its position, its z axis the
 normal, is no shape of these functions: contact/gaps.py treats it as the ground.
@@ -28,7 +28,7 @@ SHAPE_KIND = {'sphere': SPHERE, 'capsule': CAPSULE, 'box': BOX, 'cylinder': CYLI
 
 
 class Shape(NamedTuple):
-    """A shape at a pose: kind, size, centre (m, world), rotation matrix (3, 3) to the world, the
+    """A shape at a pose: kind, size, center (m, world), rotation matrix (3, 3) to the world, the
     edges of a triangle; of a hull the address of its System and its index in System.hulls.
     """
 
@@ -43,21 +43,21 @@ class Shape(NamedTuple):
 
 @compiled
 def shape_at(s: System, geom: np.record, position: np.ndarray, rotation: np.ndarray) -> Shape:
-    """The shape of a geom whose centre (3,), m, and rotation (3, 3) in the world are given."""
+    """The shape of a geom whose center (3,), m, and rotation (3, 3) in the world are given."""
     return Shape(geom.kind, vec(geom.size), vec(position), rotation, vec(geom.edges),
                  address_of(s), geom.hull)
 
 
 @compiled
 def moved_to(shape: Shape, position: Vec3) -> Shape:
-    """A shape with its centre at ``position``, m."""
+    """A shape with its center at ``position``, m."""
     return Shape(shape.kind, shape.size, position, shape.rotation, shape.edges, shape.system,
                  shape.hull)
 
 
 @compiled
 def bounding_radius(shape: Shape) -> float:
-    """Radius, m, of the bounding sphere about the centre."""
+    """Radius, m, of the bounding sphere about the center."""
     size = shape.size
     if shape.kind == BOX:
         return norm(size)
@@ -73,7 +73,7 @@ def bounding_radius(shape: Shape) -> float:
 @compiled
 def half_width(shape: Shape, n: Vec3) -> float:
     """Half-width, m, of the core of a symmetric shape along the unit vector n (world): its support
-    function about the centre, of a capsule that of its axis, without the radius. No spheres.
+    function about the center, of a capsule that of its axis, without the radius. No spheres.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == BOX:
@@ -107,7 +107,7 @@ def extent(shape: Shape, n: Vec3) -> float:
 
 @compiled
 def support_point(shape: Shape, n: Vec3) -> Vec3:
-    """Point of a shape's core farthest along n, from the centre, m, world axes; no spheres."""
+    """Point of a shape's core farthest along n, from the center, m, world axes; no spheres."""
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == BOX:
         return to_world(shape.rotation, (

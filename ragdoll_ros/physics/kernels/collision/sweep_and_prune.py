@@ -145,10 +145,12 @@ STATES, MASK, INDICES, PAIRS = (type_like(each) for each in (
 @entry(DOLLS, STATES, MASK, MASK, INDICES, type_like(0.0), PAIRS)
 def find_pairs(dolls: Dolls, states: np.ndarray, moving: np.ndarray, yielding: np.ndarray,
                clusters: np.ndarray, ahead: float, pairs: np.ndarray) -> int:
-    """Write to ``pairs`` (k, 2) the dolls that may touch within ``ahead`` s, of which one or both
-    are ``moving`` (d,), and one or both ``yielding`` (d,), the lower index first. Returns how many
-    there are, also if k are fewer. ``states`` (n, 13) of all bones; ``clusters`` (d,): cluster
-    index of each doll.
+    """Find the pairs of dolls that may touch within ``ahead`` s, by sweep and prune along x.
+
+    ``states`` (n, 13) of all n bones. Of the d dolls: ``moving`` (d,): awake; ``yielding`` (d,):
+    not kinematic; ``clusters`` (d,): index of the cluster. A pair needs one that moves and one that
+    yields, which may be the same. Writes the pairs, lower index first, to ``pairs`` (k, 2). Returns
+    the number found; if it exceeds k, the others are not written.
     """
     set_spheres(dolls, states, clusters, IMPACT_SPEEDUP * ahead)
     spheres, order, count, widest = dolls.spheres, dolls.order, 0, 0.0

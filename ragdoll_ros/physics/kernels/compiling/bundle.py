@@ -59,8 +59,8 @@ def bind(parts: tuple) -> list[np.ndarray]:
 
 
 def rebind(row: np.ndarray, kind: Bundle, name: str, part: np.ndarray) -> None:
-    """Point field ``name`` of the bundle that has this ``row`` at another array, C-contiguous and
-    of the same type, which the caller keeps alive.
+    """Make field ``name`` of the bundle that has this ``row`` refer to another array, C-contiguous
+    and of the same type, which the caller keeps alive.
     """
     assert part.flags.c_contiguous
     place, _ = kind.fields[name]

@@ -176,8 +176,9 @@ def keep(dispatcher: Dispatcher) -> None:
 
 @contextlib.contextmanager
 def alone(group: str) -> Iterator[None]:
-    """Compile a group of kernels in one process at a time: the others wait and find what the first
-    has saved. Garbage collection is off meanwhile, which saves a seventh of the time.
+    """Hold the lock of a ``group`` of kernels, so that one process at a time compiles it; those
+    that waited load what it saved. Garbage collection is off within, which saves a seventh of the
+    time.
     """
     with contextlib.ExitStack() as stack:
         if gc.isenabled():

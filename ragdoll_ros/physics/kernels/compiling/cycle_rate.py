@@ -7,7 +7,7 @@ from .decorators import entry
 
 @entry()
 def cycles_now() -> int:
-    """Cycles of the processor, as cycles() counts them; 0 where they are not counted."""
+    """Cycles of the processor by cycles(), for Python; 0 where they are not counted."""
     return cycles()
 
 

@@ -19,7 +19,7 @@ from ..workspace import Contacts, Workspace
 from .gaps import FAR, MET, NONE, SLOW, ground_point, plane_of
 from .patch import contract_friction_points
 from .placed_shape import placed_shape
-from .point_gaps import points_at_start, takes_part
+from .point_gaps import points_at_start, is_contact_of_step
 
 IDS_PER_PAIR = 1 << END_OF_IDS.bit_length()
 """Range of ids that the points of one pair have."""
@@ -118,7 +118,8 @@ def add_pair_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
         if m >= len(contacts.found):
             break
         c, at = contacts.found[m], manifold[j]
-        if at.gap > margin if h == 0.0 else tracked and not takes_part(s, ws, kin, q, k, at, h):
+        if at.gap > margin if h == 0.0 else tracked and not (
+                is_contact_of_step(s, ws, kin, q, k, at, h)):
             continue
         c.kind = ROLLING if pair.rolling_friction > 0 else FRICTIONAL
         c.body_a, c.body_b, c.id = a.body, b.body, first_id + at.feature_id
@@ -178,8 +179,10 @@ def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) 
 
 @compiled
 def is_on_plane(s: System, patch: int) -> bool:
-    """Whether a contact patch, not of a joint limit, is with the ground or a plane body, where each
-    point has its own gap.
+    """Whether a contact patch is with the ground or a plane body, where each point has its own gap.
+
+    ``patch``: index of the geom on the ground, else number of geoms + index of the pair; not that
+    of a joint limit, -1.
     """
     return patch < len(s.geoms) or s.geoms[s.pairs[patch - len(s.geoms)].b].kind == PLANE
 
@@ -224,7 +227,9 @@ def contract_to_disc(geom: np.record, k: int, kin: Kinematics, contacts: np.ndar
 
 @compiled
 def set_tangents(c: np.record) -> None:
-    """Write two unit vectors across a contact's normal, and each other, to c.tangents."""
+    """Write two unit vectors that are perpendicular to a contact's normal and to each other, right-
+    handed with the normal first, to c.tangents.
+    """
     n = vec(c.normal)
     if abs(n[2]) > 0.7:
         t = 1 - n[0] * n[0], -n[0] * n[1], -n[0] * n[2]

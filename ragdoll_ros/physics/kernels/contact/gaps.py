@@ -121,7 +121,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
         if least > NEAR:
             out[n + k] = least
         else:
-            out[n + k] = past_internal_edges(s, ws, kin, k, pair_gap(s, k, kin))
+            out[n + k] = without_internal_edges(s, ws, kin, k, pair_gap(s, k, kin))
             narrow_phases += 1
     ws.stats[0].ledger.gap_updates += 1
     ws.stats[0].ledger.narrow_phases += narrow_phases
@@ -227,11 +227,11 @@ def ground_gaps(s: System, geom: np.record, position: np.ndarray, r: np.ndarray,
 @compiled
 def ground_point(s: System, geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
                  normal: Vec3) -> Vec3:
-    """Point k of a geom that may touch the ground, world, m.
+    """Point k of a geom that may touch a plane of this unit ``normal``, m, world.
 
-    Sphere: the lowest. Capsule: the lowest of end k. Box, hull: corner k. Cylinder, k = 5 end + i:
-    the lowest of that end's rim, and four others of it. ``position``: of the geom relative to the
-    origin of ``r``'s frame, m; r (3, 3): its rotation; ``normal``: of the ground.
+    Sphere: the lowest. Capsule: the lowest of end k, 0 at -z. Box, hull: corner k. Cylinder,
+    k = 5 end + i: i = 0 is the lowest of that end's rim, 1 to 4 are those at +x, -x, -y, +y.
+    ``position``, m, and r (3, 3): the geom's pose in the world.
     """
     size = geom.size
     x = y = z = 0.0
@@ -289,7 +289,9 @@ def enable_separated_pairs(s: System, ws: Workspace, kin: Kinematics, q: np.ndar
 
 @compiled
 def mark_joints_outside(s: System, q: np.ndarray, outside: np.ndarray) -> None:
-    """Write to ``outside`` (n,) 1 for each body whose joint is outside its limits at q, else 0."""
+    """Write to ``outside``, one a body, whether its joint is outside its limits at q by more than
+    2 BEYOND_LIMIT: 1 or 0.
+    """
     for i in range(len(s.tree)):
         outside[i] = 0
     for k in range(len(s.joint_limits)):
@@ -331,8 +333,10 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
 
 
 @compiled
-def past_internal_edges(s: System, ws: Workspace, kin: Kinematics, k: int, gap: float) -> float:
-    """The ``gap``, m, of pair k, but NEAR where it is at an internal edge alone."""
+def without_internal_edges(s: System, ws: Workspace, kin: Kinematics, k: int, gap: float) -> float:
+    """Gap of pair k, m: ``gap``, or NEAR, as if it were apart, if it is a ghost collision at an
+    internal edge.
+    """
     if gap < FLUSH and is_at_internal_edge(s, kin, k, ws.contacts.edge_manifold):
         return NEAR
     return gap
@@ -353,7 +357,10 @@ def is_joint_limit_gap(s: System, ws: Workspace, j: int) -> bool:
 
 @compiled
 def one_gap(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, j: int) -> float:
-    """Gap j, of those without points of pairs, at q; ``kin``: of q, with its geoms."""
+    """Gap j at q: of a ground point or a pair, m, or of a joint limit, rad; not of a point of a
+    pair, see point_gaps.py. Exclusions and internal edges are ignored. ``kin``: of q, with its
+    geoms.
+    """
     n, first = 0, first_joint_limit_gap(s, ws)
     for k in range(len(s.geoms)):
         if n <= j < n + s.geoms[k].point_count:

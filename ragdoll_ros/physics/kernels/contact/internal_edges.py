@@ -27,8 +27,11 @@ SAME_NORMAL = 1 - 1e-10
 
 @compiled
 def is_at_internal_edge(s: System, kin: Kinematics, k: int, manifold: np.ndarray) -> bool:
-    """Whether all points at which pair k is nearer than FLUSH lie where a face of its static box is
-    continued by that of another one, which the same geom touches. Overwrites ``manifold``.
+    """Whether pair k is a ghost collision at an internal edge of its static box.
+
+    It is if all its points nearer than FLUSH lie on a face that is coplanar with one of another
+    static box on which the same geom rests, and none has that face's normal. Overwrites
+    ``manifold``.
     """
     pair = s.pairs[k]
     if s.geoms[pair.b].body != WORLD or s.geoms[pair.b].kind != BOX:
@@ -45,8 +48,8 @@ def is_at_internal_edge(s: System, kin: Kinematics, k: int, manifold: np.ndarray
 
 @compiled
 def _is_covered(a: Shape, box: Shape, other: Shape, manifold: np.ndarray) -> bool:
-    """Whether shape ``a`` touches the ``box`` only on the edge of a face that ``other`` has too, on
-    which ``a`` lies.
+    """Whether ``a`` rests on a face of ``other`` that is coplanar with one of ``box``, and touches
+    ``box`` only within that face and with other normals. Overwrites ``manifold``.
     """
     for axis in range(3):
         for side in range(2):

@@ -69,7 +69,10 @@ def measure_face(s: System, contacts: Contacts, kin: Kinematics, begin: int, end
 @compiled
 def measure_segment(c: np.record, count: int, middle: Vec3, u: np.ndarray,
                     v: np.ndarray) -> tuple[Vec3, Face]:
-    """Center, m, and face of points on a line with these tangents, as those of contact c."""
+    """Center, m, world, and Face of a patch whose ``count`` points are on a line: the segment that
+    they span. ``u``, ``v``: coordinates of the points along c.tangents, from ``middle``, m; the
+    first two become the ends of the segment, from its center.
+    """
     far = 0
     for k in range(count):
         if u[k] * u[k] + v[k] * v[k] > u[far] * u[far] + v[far] * v[far]:
@@ -132,11 +135,12 @@ def face_moments(contacts: Contacts, count: int, face: Face, x: float, y: float)
 @compiled
 def resultant_and_moment(face: Face, moments: Moments, px: float,
                          py: float) -> tuple[float, float, float]:
-    """Friction of a turning patch for a unit friction coefficient and normal force: its resultant,
-    two numbers, before it is turned by 90 degrees, and its moment, m, about the center of rotation.
+    """Means over a face of y/|y|, two numbers, and of |y|, m, weighted by an affine pressure; y:
+    position relative to the center of rotation, about which ``moments`` are.
 
-    They are the means of y/|y| and |y| under the affine pressure whose center, relative to the
-    face's, is (px, py), m; y: offset from the center of rotation, about which ``moments`` are.
+    (px, py): center of pressure relative to that of the face, m. Times friction coefficient and
+    normal force, the first, turned by 90 degrees against the rotation, is the friction force of a
+    turning patch; the second is its moment about the center of rotation.
     """
     gx, gy = face[3] * px + face[4] * py, face[4] * px + face[5] * py
     return (moments[0] + gx * moments[2] + gy * moments[4],

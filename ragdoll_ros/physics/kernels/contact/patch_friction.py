@@ -55,10 +55,12 @@ LONGEST = 4.0
 @compiled
 def set_slip_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, m: int,
                       h: float) -> bool:
-    """Set friction points and shares of the patches among m found contacts, where friction has a
-    limit, for their impulses and the velocities of ``kin``, which is that of q, over a step of h s,
-    after warm_start(); start_velocity becomes that of the new points. h = 0: an impact. Returns
-    whether any has changed by more than MOVED.
+    """Set friction points and shares of all flat patches among m found contacts whose friction has
+    a limit, by set_patch_friction(), from their impulses: at first those of warm_start().
+
+    ``kin``: of q, whose velocities give the slip. ``h``: length of the step, s; 0: an impact.
+    start_velocity becomes that of the new points. Returns whether any has changed by more than
+    MOVED: then solve again.
     """
     found, begin, changed = ws.contacts.found, 0, False
     while begin < m:
@@ -66,7 +68,7 @@ def set_slip_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
         if end - begin > 1 and found[begin].kind != LIMIT:
             reference = reference_contact(found, begin, end, h > 0)
             if reference >= 0:
-                changed |= spread_over_patch(s, ws, kin, q, begin, end, reference, h)
+                changed |= set_patch_friction(s, ws, kin, q, begin, end, reference, h)
         begin = end
     return changed
 
@@ -105,13 +107,16 @@ def slip_at(s: System, kin: Kinematics, q: np.ndarray, c: np.record,
 
 
 @compiled
-def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, begin: int,
+def set_patch_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, begin: int,
                       end: int, reference: int, h: float) -> bool:
     """Set the friction points and patch_share, a factor of the friction coefficient, of contacts
-    begin to end - 1, a patch, from their impulses and the slip at q, over a step of h s.
+    begin to end - 1, a flat patch, from their normal impulses and its slip at q.
 
-    ``reference``: the contact whose tangents measure the slip. Returns whether any has changed by
-    more than MOVED: none where the patch sticks.
+    ``reference``: index of the contact whose tangents are the axes of the slip. ``h``: length of
+    the step, s; 0: an impact. A patch that turns steadily gets points and shares by its
+    instantaneous center of rotation; else shares stay, and the points are shifted so that their
+    mean, weighted by normal impulse, is the center of pressure. Returns whether any has changed by
+    more than MOVED. A patch that slips slower than STILL sticks: it is left unchanged.
     """
     found, total, count = ws.contacts.found, 0.0, end - begin
     middle = pressed = mean = (0.0, 0.0, 0.0)
@@ -151,9 +156,11 @@ def spread_over_patch(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
 @compiled
 def is_steady(c: np.record, at: Vec3, slip: tuple[float, float, float], size: float,
               slow: float) -> bool:
-    """Whether a patch of this ``size``, m, with contact c slips by ``slip`` at the point ``at``,
-    hardly differently from how it did as the step began, and faster than ``slow``, m/s, of which
-    friction may leave nothing.
+    """Whether a persistent contact c slips faster than ``slow``, m/s, the speed that friction can
+    stop in a step, and its slip has changed by less than the share UNSTEADY since the step began.
+
+    ``slip``: along the tangents, m/s, and about the normal, rad/s, at the point ``at``, m, world.
+    ``size``: half extent of its patch, m.
     """
     speed, arm = abs(slip[0]) + abs(slip[1]) + size * abs(slip[2]), sub(at, vec(c.friction_point))
     change = (abs(slip[0] - c.start_velocity[1] + c.spin * dot(vec(c.tangents[1]), arm))

@@ -17,7 +17,7 @@ from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import add, dot, sub, to_local, to_world, vec
 from ..system import MAX_MANIFOLD_POINTS, System
 from ..workspace import Workspace
-from .gaps import EXCLUDED, FAR, NONE, SLOW, one_gap, pair_gap, past_internal_edges
+from .gaps import EXCLUDED, FAR, NONE, SLOW, one_gap, pair_gap, without_internal_edges
 from .jacobian import normal_velocity
 from .placed_shape import placed_shape
 
@@ -47,7 +47,9 @@ def track_points(s: System, ws: Workspace, kin: Kinematics) -> None:
 
 @compiled
 def find_manifold(s: System, kin: Kinematics, k: int, manifold: np.ndarray) -> int:
-    """Write the points of pair k that are nearer than FAR to ``manifold``. Returns their number."""
+    """Write the contact manifold of pair k, points with a gap below FAR, to ``manifold``; their
+    number.
+    """
     return collide(placed_shape(s, kin, s.pairs[k].a), placed_shape(s, kin, s.pairs[k].b), FAR,
                    manifold)
 
@@ -55,7 +57,7 @@ def find_manifold(s: System, kin: Kinematics, k: int, manifold: np.ndarray) -> i
 @compiled
 def points_at_start(ws: Workspace, k: int) -> tuple[int, int]:
     """Range begin, end (end excluded) in contacts.points of the points that pair k had as the step
-    began; only of a pair that had some, whose first_point is not NONE.
+    began. Requires that it had some: first_point[k] is not NONE.
     """
     begin, count = ws.contacts.first_point[k], ws.step.scalars[0].start_point_count
     end = begin
@@ -136,10 +138,11 @@ def approach_speed(s: System, kin: Kinematics, q: np.ndarray, k: int, at: np.rec
 def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, h: float,
                       out: np.ndarray) -> None:
     """Write the gaps of pairs that touched as the step began, and of their points, at the end of a
-    trial of h s, to ``out``; after update_gaps(). ``kin``: of the end, with its geoms.
+    trial step of h s, to ``out``, in the order of ws.gaps; after update_gaps(). ``kin``: of the
+    end, with its geoms.
 
-    Points that the manifold at the end lacks get FAR; so do all points of a pair that touches at
-    an internal edge alone. Points that touch and are not tracked yet are added.
+    Points that the manifold at the end lacks get FAR; so do all points of a pair that touches at an
+    internal edge alone. Points that touch and are not tracked yet are added.
     """
     counts, contacts = ws.gap_counts[0], ws.contacts
     first = counts.fixed - len(s.pairs)
@@ -153,7 +156,7 @@ def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, h: float,
             gap = min(gap, contacts.manifold[j].gap)
         if found == 0 or TRIANGLE in (s.geoms[s.pairs[k].a].kind, s.geoms[s.pairs[k].b].kind):
             gap = pair_gap(s, k, kin)
-        out[first + k] = past_internal_edges(s, ws, kin, k, gap)
+        out[first + k] = without_internal_edges(s, ws, kin, k, gap)
         if out[first + k] > gap:
             continue
         for j in range(found):
@@ -166,11 +169,13 @@ def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, h: float,
 
 
 @compiled
-def takes_part(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int, at: np.record,
-               h: float) -> bool:
-    """Whether a point of pair k at the middle of a step of h s, ``at`` of contacts.manifold, is a
-    contact of the step: by its gap in contacts.gaps_active, else if it closes too slowly, or from
-    too near, to be an impact. ``kin``: of q and the velocities there.
+def is_contact_of_step(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int,
+                       at: np.record, h: float) -> bool:
+    """Whether a point of pair k, ``at``, found at the middle of a step of h s, is a contact of it.
+
+    A tracked point is if its gap in contacts.gaps_active counts as touching. Any other is if its
+    gap, extrapolated to the start of the step, is at most SLOW h: too small for an impact. ``kin``:
+    of q and v at the middle.
     """
     i = find_point(ws, k, at.feature_id)
     if i != NONE:

@@ -15,9 +15,8 @@ from .kinematics import Kinematics, inertia_times, linear, put_spatial, velocity
 @compiled
 def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, v: np.ndarray,
                 kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
-    """Write to ``out`` (nv,) H dv/dt without joint damping, springs and contacts: the generalized
-    forces of gravity and ``loads`` (LOAD), less the velocity-dependent terms. It is minus
-    Featherstone's bias force C with the loads as external forces.
+    """Write -C to ``out`` (nv,), C being Featherstone's bias force with ``loads`` (LOAD) as
+    external forces: H dv/dt without joint damping, springs and contacts.
 
     ``kin``: of velocities v (nv,), with inertias and the roots' motion subspaces. ``dyn``: scratch.
     """

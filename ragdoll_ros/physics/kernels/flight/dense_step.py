@@ -135,7 +135,9 @@ def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance:
 
 @compiled
 def largest_rate(cluster: ClusterState) -> float:
-    """Largest rate of change at the ends of a step, m/s or rad/s, as step_error() weighs errors."""
+    """Largest |dq/dt|, m/s or rad/s, or |dv/dt| times SLOWEST, at the ends of a step: as
+    step_error() weighs errors.
+    """
     most = 0.0
     for end in range(2):
         for j in range(cluster.end_rates.shape[1]):

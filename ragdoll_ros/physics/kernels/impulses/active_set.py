@@ -103,9 +103,9 @@ def initial_active_set(island: Island, m: int, p: np.ndarray) -> int:
 @compiled
 def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: int,
                 U: np.ndarray) -> bool:
-    """Write rows ``start`` to ``count`` - 1 of the upper Cholesky factor U of W[places, places] to
-    U, by U^T U; the rows before are given. W and U are flat, n elements a row. Returns whether the
-    matrix is positive definite.
+    """Write rows ``start`` to ``count`` - 1 of the upper Cholesky factor U to U, with U^T U =
+    W[places, places]; the rows before are given. W and U are flat, n elements a row. Returns
+    whether the matrix is positive definite.
     """
     for i in range(start, count):
         at = places[i] * n

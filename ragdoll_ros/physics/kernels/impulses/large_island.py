@@ -122,9 +122,11 @@ def prepare_newton(s: System, ws: Workspace, m: int) -> int:
 @compiled
 def solve_rows(s: System, ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
                tolerance: float, rounds: int) -> tuple[float, int]:
-    """Solve for p (n,) in place, starting from p: by sweeps, and where these stall by Newton's
-    method, in so many rounds. Returns the residual, m/s, and the number of sweeps. island.z becomes
-    Y^T p.
+    """Solve the contact laws on the row velocities W p + b for the impulses p (n,), in place from
+    the given p: by sweeps and, where these stall, Newton's method, in at most ``rounds`` rounds.
+
+    b (n,): row velocities without p, m/s; for position correction displacements, m. Returns the
+    residual, m/s or m, and the number of sweeps. island.z becomes Y^T p.
     """
     left, done, most = linearize(ws, m, b, p)[0], 0, LARGE_SWEEPS
     for _ in range(rounds):

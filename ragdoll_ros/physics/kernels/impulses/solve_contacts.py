@@ -98,8 +98,8 @@ def solve_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: 
 def collect_island(ws: Workspace, begin: int, m: int, number: int) -> tuple[int, int]:
     """Write the contacts of island ``number`` from found[begin] on to island.members, and number
     their rows. Returns the numbers of contacts and of rows that were written; those for which
-    there is no room are counted in stats.contacts_dropped. Marks all of them as done: their
-    ``island`` becomes -1 - number.
+    island.Y has no rows left are counted in stats.contacts_dropped. Marks all of them as done:
+    their ``island`` becomes -1 - number.
     """
     count = rows = 0
     for i in range(begin, m):
@@ -142,6 +142,9 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
     island.free_velocity, the same with restitution and gaps to island.rhs, the curvature bias, the
     initial impulses, and in its members the penetrations to correct. Returns whether a contact has
     restitution, and whether one has penetration. After contact_jacobian().
+
+    Rows at the middle of a step contain the curvature term h/2 dJ/dt v of J v. The target row
+    velocity of a persistent contact is minus that term, for J v to be 0 at the end.
     """
     island = ws.island
     b, was, curve = island.rhs, island.start_velocity, island.curvature

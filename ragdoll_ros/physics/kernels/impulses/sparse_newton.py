@@ -243,9 +243,10 @@ def multiply_rows(island: Island, k: int) -> None:
 
 
 @compiled
-def solve_for_z(island: Island, dofs: int) -> bool:
-    """Solve for the step dz = Y^T dp, after multiply_rows() of all members, and write it to
-    island.z_direction in order of elimination. Returns whether the matrix is regular.
+def solve_for_dz(island: Island, dofs: int) -> bool:
+    """Assemble the matrix of the module's head, after multiply_rows() of all members, and solve for
+    the step dz = Y^T dp: island.z_direction, in order of elimination. Returns whether it is
+    regular.
     """
     lu, Y, dz = island.lu, island.Y, island.z_direction
     for i in range(dofs):
@@ -334,11 +335,12 @@ def take_step(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
 @compiled
 def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
                   dofs: int) -> float:
-    """Solve a large island for its impulses p (n,), N s: at most SPARSE_STEPS Newton steps from the
-    given p, until the residual is at most ``tolerance``, m/s. p becomes the best found.
+    """Solve a large island of m contacts and n rows for its impulses p (n,), N s: at most
+    SPARSE_STEPS Newton steps from the given p, until the residual is at most ``tolerance``, m/s. p
+    becomes the best found.
 
-    b (n,): velocities of the rows without impulses, m/s. ``dofs``: from find_sparsity(). Writes
-    Y^T p to island.z. Returns the residual of the best p, m/s.
+    b (n,): velocities of the rows without impulses, m/s. ``dofs``: number of degrees of freedom,
+    from find_sparsity(). Writes Y^T p to island.z. Returns the residual of the best p, m/s.
     """
     island, keep = ws.island, ws.island.best
     best, late, proximal, before = math.inf, 0, MOST_PROXIMAL, math.inf
@@ -358,7 +360,7 @@ def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, t
         for k in range(m):
             eliminate_contact(island, k, proximal)
             multiply_rows(island, k)
-        if not solve_for_z(island, dofs):
+        if not solve_for_dz(island, dofs):
             break
         find_direction(island, m)
         most, older, old = max(total, old, older), old, total

@@ -66,7 +66,7 @@ def _series(product: float, total: float) -> tuple[float, float, float]:
 
 @compiled
 def _phi1(x: float) -> float:
-    """(e^x - 1)/x, x <= 0."""
+    """The phi function (e^x - 1)/x for x <= 0; 1 at x = 0."""
     return exp_minus(x)[1] / x if x < 0 else 1.0
 
 

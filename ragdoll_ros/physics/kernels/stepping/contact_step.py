@@ -30,7 +30,7 @@ from ..system import NO_SLIP, System
 from ..workspace import Workspace
 from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
 from .impact import closes_fast
-from .position_correction import (clip_to_joint_limits, correction_energy, write_correction_bounds,
+from .position_correction import (clip_to_joint_limits, correction_energy, write_correction_motion,
                                   limit_correction_energy)
 from .springs import add_implicit_spring, add_spring_force, saturate_springs, theta_weight
 from .warm_start import warm_start
@@ -82,12 +82,11 @@ def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
 
 @compiled
 def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float) -> int:
-    """Compute a step of h s, after begin_contact_step(): write step.q_end, without position
-    correction, step.v_end, step.correction, and contacts.found with impulses. Returns their number.
+    """Compute one step of h s, after begin_contact_step(): step.q_end, before position correction,
+    step.v_end, step.correction, and contacts.found with their impulses. Returns the number of
+    contacts.
 
-    Rows at the middle contain the curvature term h/2 dJ/dt v of J v; the target row velocity is
-    minus that term, for J v to be 0 at the end. ``since``: s since springs' targets were at
-    spring.target.
+    ``since``: time, s, since the targets of springs were at spring.target.
     """
     q, v, step, kin = cluster.q, cluster.v, ws.step, ws.step.middle
     ledger, start_cycles = ws.stats[0].ledger, cycles()
@@ -240,7 +239,7 @@ def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since
         forward_kinematics(s.tree, q, v, kin)
         sum_dolls(s, ws, kin, q, step.sums_after)
         conserve_momentum(s, ws, h, q, v)
-    write_correction_bounds(s, kin, q, step.correction, ws.contacts.motion)
+    write_correction_motion(s, kin, q, step.correction, ws.contacts.motion)
     update_kinematics_and_gaps(s, ws, kin, q, v, ws.gaps, h, ws.contacts.gaps_end)
     update_point_gaps(s, ws, kin, h, ws.contacts.gaps_end)
     sum_dolls(s, ws, kin, q, step.sums_after)

@@ -35,10 +35,11 @@ def closes_fast(c: np.record) -> bool:
 
 
 @compiled
-def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m: int,
+def keep_impacting(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m: int,
              landed: float) -> int:
-    """Drop those of m contacts found at cluster.q that take no part in an impact, see MET; what
-    approaches does below the gap ``landed``, m or rad. Returns how many are kept.
+    """Keep, in contacts.found, those of its first m contacts that an impact at cluster.q solves:
+    with a gap up to MET, those that had_met() in the last step, and those that close fast with a
+    gap up to ``landed``, m or rad. Returns their number.
     """
     contacts, known, count = ws.contacts.found, ws.stats[0].contact_count, 0
     for i in range(m):
@@ -67,7 +68,7 @@ def follow_twist(s: System, ws: Workspace, cluster: ClusterState) -> None:
 def impact(s: System, ws: Workspace, cluster: ClusterState, time: float, landed: float) -> int:
     """Add to cluster.v the change by the impulses of everything that has met at q by ws.gaps, and
     log what met, ``time`` s after the beginning of the advance, where a log is kept. Returns how
-    many contacts that touch were left out. ``landed``: see keep_met().
+    many contacts that touch were left out. ``landed``: see keep_impacting().
     """
     q, v, kin, dyn, contacts = (cluster.q, cluster.v, ws.step.start, ws.step.dynamics,
                                 ws.contacts.found)
@@ -75,7 +76,7 @@ def impact(s: System, ws: Workspace, cluster: ClusterState, time: float, landed:
     forward_kinematics(s.tree, q, v, kin)
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     touching = find_contacts(s, ws, kin, q, ws.gaps, 0.0)
-    m = keep_met(s, ws, cluster, kin, touching, landed)
+    m = keep_impacting(s, ws, cluster, kin, touching, landed)
     if m == 0:
         return touching
     root_motion_subspaces(s.tree, q, kin)

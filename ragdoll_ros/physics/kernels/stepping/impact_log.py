@@ -31,11 +31,11 @@ NORMAL_COLUMNS, CENTER_COLUMNS = 0, 1
 @compiled
 def log_impacts(s: System, ws: Workspace, cluster: ClusterState, m: int, in_step: bool,
                 slowest: float, time: float) -> None:
-    """Enter those of m contacts in the log that have closed faster than ``slowest``, m/s, ``time``
-    s after the beginning of the advance: one entry for each patch, at its center of pressure.
+    """Log one entry for each patch, at its center of pressure, of those of m contacts, joint limits
+    excluded, that closed faster than ``slowest``, m/s. ``time``: s since the advance began.
 
-    After solve_contacts() of an impact, or, ``in_step``, of a step that does not seek impacts, in
-    which what has no contact as it begins meets. The m contacts are changed.
+    After solve_contacts() of an impact, or, ``in_step``, of a step that does not seek impacts, of
+    which contacts that did not exist at its start are logged. The m contacts are changed.
     """
     kin, q = ws.step.start, cluster.q
     if in_step:

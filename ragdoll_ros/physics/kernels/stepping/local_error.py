@@ -48,7 +48,9 @@ def local_error(cluster: ClusterState, v_end: np.ndarray, h: float) -> float:
 
 @compiled
 def allowed_error(nominal: float) -> float:
-    """Local error, m or rad, allowed to a step that is longer than the nominal ``nominal`` s."""
+    """Largest local error, m or rad, of a step that is longer than the nominal one of ``nominal``
+    s.
+    """
     return nominal * nominal / 12 * QUIET
 
 

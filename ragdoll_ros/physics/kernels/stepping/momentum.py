@@ -92,11 +92,14 @@ def total_energy(dolls: np.ndarray) -> tuple[float, float]:
 
 
 @compiled
-def add_impulse(external: np.record, share: float, at: Vec3, impulse: Vec3) -> None:
-    """Add ``share`` times an impulse, N s, at the point ``at``, m, world, to impulse and moment."""
+def add_impulse(external: np.record, factor: float, at: Vec3, impulse: Vec3) -> None:
+    """Add ``factor`` times an ``impulse``, N s, at the point ``at``, m, world, to external.impulse,
+    and its moment about the world's origin to external.moment. Also takes a force, N, with a time,
+    s, as the factor.
+    """
     moment = cross(at, impulse)
-    put(external.impulse, add_scaled(vec(external.impulse), share, impulse))
-    put(external.moment, add_scaled(vec(external.moment), share, moment))
+    put(external.impulse, add_scaled(vec(external.impulse), factor, impulse))
+    put(external.moment, add_scaled(vec(external.moment), factor, moment))
 
 
 @compiled
@@ -273,8 +276,9 @@ def remove_energy(s: System, ws: Workspace, gained: float, q: np.ndarray, v: np.
 
 @compiled
 def locked_angular_velocity(ws: Workspace, doll: np.record, angular_momentum: Vec3) -> Vec3:
-    """Angular velocity, rad/s, that a doll with all joints locked has with this angular momentum
-    about its center of mass. Overwrites step.spin and step.dynamics.matrix.
+    """Angular velocity, rad/s, world axes, that a doll (its DOLL_SUMS) with all joints locked has
+    with this angular momentum about its center of mass. Overwrites step.spin and
+    step.dynamics.matrix.
     """
     matrix, spin = ws.step.dynamics.matrix, ws.step.spin
     for j in range(3):

@@ -40,8 +40,8 @@ def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.nda
     """Scale a displacement ``correction`` (nv,), and its scalars.correction_energy, so that this
     stays below the share PAID_SHARE of the internal kinetic energy.
 
-    If one of m contacts is deep, with the world, with a kinematic body or past a joint limit, the
-    displacement stays whole, and the excess, J, is added to stats.work_position_correction.
+    If one of m contacts is deep, and is a joint limit or a contact with the world or a kinematic
+    body, the displacement stays whole: the excess, J, is added to stats.work_position_correction.
     """
     is_deep, scalars = False, ws.step.scalars[0]
     for i in range(m):
@@ -61,10 +61,10 @@ def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.nda
 
 
 @compiled
-def write_correction_bounds(s: System, kin: Kinematics, q: np.ndarray, correction: np.ndarray,
+def write_correction_motion(s: System, kin: Kinematics, q: np.ndarray, correction: np.ndarray,
                             motion: np.ndarray) -> None:
-    """Write the distance, m, and angle, rad, by which a displacement ``correction`` (nv,) moves
-    each body i to motion[i].correction and correction_angle: bounds for the update of gaps.
+    """Write how far a displacement ``correction`` (nv,) moves each body, for the update of gaps:
+    its center of mass, m, to motion[i].correction, its angle of rotation, rad, to correction_angle.
     ``kin`` is that of q; its velocities are overwritten.
     """
     some = False

@@ -49,7 +49,7 @@ def spring_jacobian(axis: np.ndarray, spring: np.record, arm: Vec3) -> Vec3:
 def add_implicit_spring(s: System, kin: Kinematics, H: np.ndarray, spring: np.record,
                         h: float) -> None:
     """Add the implicit stiffness and damping of a spring in a step of h s to H:
-    h implicit_damping() J^T J, of a grab h (k h / 4 + c / 2) J^T J; nothing if it is saturated.
+    h implicit_damping() J^T J, to the lower triangle; nothing if it is saturated.
     The degrees of freedom of a body are on one path to the root, so H keeps its sparsity.
     """
     i = spring.body
@@ -76,7 +76,8 @@ def spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, sprin
 
     Of an angular drive: torque, N m, and angular velocity, rad/s. Of a joint spring: torque and
     joint rate, as the first entries, the others zero. A saturated spring has its saturated_force.
-    ``kin`` is that of q. ``time``: s since the spring's target was set.
+    ``kin`` is that of q. ``time``: s since the spring's target was set;
+    it moves at target_velocity until time_left.
     """
     i = spring.body
     gone = min(time, spring.time_left)

@@ -31,12 +31,12 @@ def jam_threshold(s: System, ws: Workspace, h: float) -> float:
 
 @compiled
 def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) -> None:
-    """Write to m found contacts the impulses of the ``known`` contacts of the last step with the
-    same ids, as initial ones, and whether they are persistent, with take_start(). Those of the last
-    trial of this step, contacts.tried, come first.
+    """Set the initial impulses of m found contacts, by id: those of contacts.tried, the last trial
+    of this step, else those of ``known``, the last step, scaled by the ratio of step lengths, else
+    0. Marks those that are persistent, and gives them start velocities by take_start().
 
-    Impulses between jammed contacts are undetermined and would grow from step to step: above the
-    threshold they begin at zero.
+    Impulses of jammed contacts are undetermined and would grow from step to step: above
+    jam_threshold(), all begin at zero.
     """
     stats, pressed = ws.stats[0], 0.0
     tried_count = ws.step.scalars[0].tried_count

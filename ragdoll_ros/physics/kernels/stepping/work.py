@@ -98,8 +98,9 @@ def add_load_impulse(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, l
 
 @compiled
 def load_potential(s: System, kin: Kinematics, q: np.ndarray, loads: np.ndarray) -> float:
-    """Sum of F x, J, over forces along the world's axes, x where they act at q: its growth is the
-    work of a constant force, whatever the path. ``kin`` is that of q.
+    """Minus the potential energy, J, of the loads whose force is constant in the world (local = 0)
+    at q: the sum of force times position. Its increase is their work, whatever the path. Torques
+    and forces in a bone's axes are left out. ``kin`` is that of q.
     """
     total = 0.0
     for k in range(len(loads)):

@@ -118,7 +118,8 @@ def rate_of_turn(vector: Vec3, rate: Vec3) -> Vec3:
 
 @compiled
 def rate_of_vector(vector: Vec3, angular: Vec3) -> Vec3:
-    """Rate of a rotation vector with this angular velocity: the inverse left Jacobian, eq. 7.76.
+    """Rate, rad/s, of a rotation ``vector``, rad, whose rotation has this ``angular`` velocity: the
+    inverse left Jacobian, eq. 7.76 of the source above.
 
     Beyond 1.5 pi, near its singularity, the angular velocity itself.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..maths.vectors import add_scaled, norm, put, vec
 from .bone_path import set_bones
-from .colliders import FREE, TOUCH, contact, copy_state, step_touching
+from .colliders import FREE, TOUCH, copy_state, step_touching, tip_contact
 from .link_step import limited, root_forces, root_frame, set_response, tip_frame
 from .links import Around, Chains
 
@@ -31,7 +31,9 @@ MAX_PARTS = 64
 
 @compiled
 def longest_step(chains: Chains, states: np.ndarray, chain: int) -> float:
-    """Time, s, in which no tip of a chain moves by more than LARGEST_MOVE."""
+    """Time, s, in which no tip of a chain moves farther, at the present speeds, than LARGEST_MOVE
+    times the least radius of its colliders.
+    """
     radius, speed = FREE, 0.0
     for k in range(chains.firsts[chain], chains.lasts[chain]):
         radius = min(radius, chains.colliders[k].radius)
@@ -69,12 +71,14 @@ def try_step(chains: Chains, states: np.ndarray, chain: int, h: float, bones_bef
 
 @compiled
 def gap_before(chains: Chains, chain: int, bones: np.ndarray) -> float:
-    """Least gap, m, of chains.before to colliders that no tip of the chain touches."""
+    """Least gap, m, of chains.before: of all pairs of a tip and a collider that are more than TOUCH
+    apart. ``bones`` (b, 13): their states at that time.
+    """
     least = FREE
     for k in range(chains.starts[chain], chains.ends[chain]):
         for number in range(chains.firsts[chain], chains.lasts[chain]):
             collider = chains.colliders[number]
-            gap = contact(chains.links[k], chains.before[k], collider, bones[collider.bone])[0]
+            gap = tip_contact(chains.links[k], chains.before[k], collider, bones[collider.bone])[0]
             if gap > TOUCH:
                 least = min(least, gap)
     return least

@@ -1,6 +1,6 @@
 """Contact of the mass at a link's tip with colliders: inelastic, without friction.
 
-The tip at p = r + l d may not be nearer to the axis of a capsule (or the centre of a sphere) than
+The tip at p = r + l d may not be nearer to the axis of a capsule (or the center of a sphere) than
 the radius R. With q the axis' nearest point, D u = q - r and |u| = 1, it is inside while the angle
 between d and u is below that of cos = (D^2 + l^2 - R^2)/(2 D l). Where no d is outside there is no
 contact.
@@ -60,11 +60,13 @@ def copy_state(source: np.ndarray, target: np.ndarray) -> None:
 
 
 @compiled
-def contact(link: np.ndarray, state: np.ndarray, collider: np.ndarray,
-            bone: np.ndarray) -> tuple[float, Vec3, float, float, float]:
-    """Of a link's tip and a collider on a bone (13,): gap, m; unit tangent at d that leads out;
-    angle to the surface along it, rad, above 0 inside; lever, m, by which the tip moves along the
-    normal when d turns so; and speed of the gap, m/s.
+def tip_contact(link: np.ndarray, state: np.ndarray, collider: np.ndarray,
+                bone: np.ndarray) -> tuple[float, Vec3, float, float, float]:
+    """Contact of the mass at a link's tip with a collider on a ``bone``, whose state is (13,).
+
+    Returns the gap, m; the unit tangent at the link's direction d along which d turns away from the
+    collider; the angle, rad, by which d must turn along it to reach the surface, negative outside;
+    the derivative of the gap by that angle, m/rad; and the rate of the gap, m/s.
     """
     d, root, length = vec(state.direction), vec(state.point), link.length
     tip = add_scaled(root, length, d)
@@ -103,7 +105,7 @@ def contact(link: np.ndarray, state: np.ndarray, collider: np.ndarray,
 def stop_at(link: np.ndarray, state: np.ndarray, collider: np.ndarray, bone: np.ndarray,
             is_held: bool) -> None:
     """Take a touching tip's speed into a collider, and if it ``is_held`` there, out of it."""
-    gap, out, _, lever, speed = contact(link, state, collider, bone)
+    gap, out, _, lever, speed = tip_contact(link, state, collider, bone)
     if gap < TOUCH and lever > LEAST_LEVER * link.length and (speed < 0 or is_held):
         put(state.rate, add_scaled(vec(state.rate), -speed / lever, out))
 
@@ -115,7 +117,7 @@ def move_out(link: np.ndarray, state: np.ndarray, frame: Frame, around: Around) 
     for _ in range(SWEEPS):
         is_inside = False
         for k in range(around.first, around.until):
-            gap, out, angle, _, _ = contact(link, state, colliders[k], bones[colliders[k].bone])
+            gap, out, angle, _, _ = tip_contact(link, state, colliders[k], bones[colliders[k].bone])
             if gap < -ACCURACY:
                 is_inside = True
                 d, _ = exp_map(vec(state.direction), scale(angle, out))
@@ -135,9 +137,9 @@ def step_touching(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np
     step_link(link, r, state, frame, forces)
     least, is_inside = FREE, False
     for k in range(around.first, around.until):
-        gap = contact(link, state, colliders[k], bones[colliders[k].bone])[0]
+        gap = tip_contact(link, state, colliders[k], bones[colliders[k].bone])[0]
         if gap < TOUCH:
-            was = contact(link, before, colliders[k], bones_before[colliders[k].bone])[0]
+            was = tip_contact(link, before, colliders[k], bones_before[colliders[k].bone])[0]
             if was <= TOUCH or around.holds_all:
                 is_inside = is_inside or gap < -ACCURACY
                 continue
@@ -162,10 +164,10 @@ def hold(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np.ndarray,
         is_done = True
         for k in range(first, until):
             collider = colliders[k]
-            gap, out, angle, _, _ = contact(link, state, collider, bones[collider.bone])
+            gap, out, angle, _, _ = tip_contact(link, state, collider, bones[collider.bone])
             if gap >= -ACCURACY and (held[k - first] == 0 or gap <= ACCURACY):
                 continue
-            was, normal, _, _, _ = contact(link, before, collider, bones_before[collider.bone])
+            was, normal, _, _, _ = tip_contact(link, before, collider, bones_before[collider.bone])
             if was > TOUCH and not around.holds_all:
                 continue
             share = dot(normal, out)
@@ -178,8 +180,8 @@ def hold(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np.ndarray,
             push = (0.0, 0.0, 0.0)
             for other in range(first, until):
                 if held[other - first] > 0:
-                    _, normal, _, _, _ = contact(link, before, colliders[other],
-                                                 bones_before[colliders[other].bone])
+                    _, normal, _, _, _ = tip_contact(link, before, colliders[other],
+                                                     bones_before[colliders[other].bone])
                     push = add_scaled(push, held[other - first], normal)
             copy_state(before, state)
             step_link(link, r, state, frame, (add(forces[0], push), add(forces[1], push)))

@@ -50,7 +50,7 @@ LEAST = 1e-300
 
 @compiled
 def set_response(link: np.ndarray, h: float, r: np.ndarray) -> None:
-    """Write to ``r`` a link's response to a step of ``h`` s."""
+    """Write the coefficients of a link's motion over a step of ``h`` s to ``r`` (RESPONSE)."""
     w, c = link.stiffness, link.damping
     m, n1, n3 = oscillator_response(w, c, h)
     keep, damping_share = 1 - w * n1 - c * m, c * n1 / h
@@ -125,7 +125,9 @@ def tip_frame(link: np.ndarray, state: np.ndarray, most: float) -> Frame:
 
 @compiled
 def place(link: np.ndarray, state: np.ndarray, frame: Frame, d: Vec3) -> None:
-    """Write frame, direction, and what follows from them; the rate stays."""
+    """Write the ``frame`` at a link's root and its unit direction d to ``state`` (LINK_STATE), and
+    what follows from these, to_rest, rad, and drift, 1/s. The rate is not changed.
+    """
     put(state.point, frame.point)
     put(state.velocity, frame.velocity)
     put(state.axes[0], frame.x)
@@ -157,7 +159,7 @@ def step_link(link: np.ndarray, r: np.ndarray, state: np.ndarray, frame: Frame,
     """Advance ``state`` (LINK_STATE) by one step, in place.
 
     ``r`` (RESPONSE): coefficients of the link's motion over a step of this length; ``frame``: at
-    its root at the end; ``forces``: at both ends, 1/s^2, see root_forces().
+    its root at the end of the step; ``forces``: at its start and end, 1/s^2, see root_forces().
     """
     start, end = forces
     d, rate = vec(state.direction), vec(state.rate)

@@ -39,6 +39,6 @@ def exp_map(d: Vec3, x: Vec3) -> tuple[Vec3, Vec3]:
 @compiled
 def transported(v: Vec3, x: Vec3, chord: Vec3) -> Vec3:
     """Parallel transport of a tangent ``v`` at d along the geodesic of exp_map(d, x), whose second
-    value is ``chord``.
+    return value is ``chord``.
     """
     return add_scaled(v, -dot(x, v), chord)

@@ -58,7 +58,9 @@ class LimitedAxis(NamedTuple):
 
 @compiled
 def core_separation(a: Shape, corners: Corners, c: Vec3, d: Vec3) -> float:
-    """Separation s(d), m, of a's core at ``c``, m, from the triangle's centroid."""
+    """Separation s(d), m, of a's core and the triangle along the unit vector d. ``c``: a's center
+    from the triangle's, m.
+    """
     half = 0.0 if a.kind == SPHERE else core_extent(a, neg(d))
     return dot(c, d) - half - max(dot(corners[0], d), dot(corners[1], d), dot(corners[2], d))
 
@@ -86,7 +88,7 @@ def triangle_lower_bounds(a: Shape, t: Shape) -> tuple[float, float]:
 @compiled
 def edge_direction(a: Shape, c: Vec3, corner: Vec3, edge: Vec3, turn: int) -> Vec3:
     """Candidate axis number ``turn`` of an edge of the triangle and a's core, perpendicular to the
-    edge, of any length.
+    edge, not normalized.
 
     Box, hull: edge x edge ``turn`` of a. Others: 0: edge x axis of a; 1, 2: from the edge to an end
     of the axis. ``edge``: unit vector from ``corner``; ``c``, ``corner``: a's center and the

@@ -101,7 +101,9 @@ def a_edge(a: Shape, arm: Vec3, n: Vec3) -> tuple[Vec3, Vec3]:
 
 @compiled
 def triangle_edge(corners: Corners, feature: int) -> tuple[Vec3, Vec3]:
-    """Midpoint and half vector, m, of an edge, feature 0 to 2; of a corner the corner and 0."""
+    """Midpoint and half of the vector, m, of an edge, feature 0 to 2; of a corner, from
+    FIRST_CORNER on, the corner and 0.
+    """
     if feature >= FIRST_CORNER:
         return corners[feature - FIRST_CORNER], (0.0, 0.0, 0.0)
     begin, end = corners[feature], corners[(feature + 1) % 3]
@@ -189,10 +191,12 @@ def goes_on(edges: Vec3, side: int) -> bool:
 
 @compiled
 def clip_triangle(a: Shape, arm: Vec3, corners: Corners, n: Vec3, scratch: np.ndarray) -> int:
-    """Clip the triangle by the face of a, a box, cylinder or hull, that is farthest along -n.
+    """Contact points of a face of a, which clips the triangle: that of a box, cylinder or hull that
+    is farthest along -n; n: unit contact axis, from the triangle to a.
 
-    Coordinates are relative to the triangle's center; ``arm``: a's center. Writes the points to
-    ``scratch`` from MAX_CLIPPED on. Returns their number.
+    Coordinates are along world axes, relative to the triangle's center, m; ``arm``: a's center.
+    Writes the points, halfway in the gap, with their gaps, m, and feature ids to ``scratch`` from
+    MAX_CLIPPED on. Returns their number.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
     sides = scratch[2 * MAX_CLIPPED:2 * MAX_CLIPPED + MAX_CORNERS]
