@@ -141,7 +141,7 @@ def test_a_page_whose_line_is_cut_lets_go_and_comes_back_to_what_is(browser, vie
 def test_a_page_that_goes_asks_nothing_of_the_node_and_may_come_back(view, heard, listener):
     view.hold_at(SCENE, START)
     address = view.page.url
-    assert listener.count_subscribers('ragdoll/poses') == 2
+    view.wait(lambda: listener.count_subscribers('ragdoll/poses') == 2)
     view.page.goto('about:blank')
     view.wait(lambda: listener.count_subscribers('ragdoll/poses') == 1)
     view.go(address)

@@ -48,14 +48,19 @@ def node(make_node, monkeypatch):
 def test_ticks_are_on_time_and_few_go_through_rclpys_executor(node, peer):
     got = peer.collect(PoseArray, 'ragdoll/poses')
     peer.wait(lambda: got)
-    begin, polls = node.simulation.time, node.polls
-    peer.wait(lambda: len(got) > 200)
-    ticks = (node.simulation.time - begin) / node.simulation.tick
-    stamps = [message.header.stamp.sec * 10 ** 9 + message.header.stamp.nanosec
-              for _, message in got]
-    assert np.median(np.diff(stamps)) == node.simulation.tick
-    # After one in ten the services are polled, once unless one is called.
-    assert node.polls - polls < 0.2 * ticks
+
+    def on_time_with_few_polls():
+        """Whether 200 ticks are; if others take the machine's time away, the next 200 may be."""
+        begin, polls, count = node.simulation.time, node.polls, len(got)
+        peer.wait(lambda: len(got) > count + 200)
+        ticks = (node.simulation.time - begin) / node.simulation.tick
+        stamps = [message.header.stamp.sec * 10 ** 9 + message.header.stamp.nanosec
+                  for _, message in got[count:]]
+        # After one in ten the services are polled, once unless one is called.
+        return (np.median(np.diff(stamps)) == node.simulation.tick
+                and node.polls - polls < 0.2 * ticks)
+
+    peer.wait(on_time_with_few_polls)
 
 
 def test_messages_act_at_the_next_tick(node, peer):
@@ -94,6 +99,7 @@ def test_services_answer_between_ticks_that_are_seconds_apart(node, peer):
         parameters=[Parameter('real_time_factor', value=0.001).to_parameter_msg()])
     assert peer.call(SetParametersAtomically, 'ragdoll/set_parameters_atomically',
                      set_factor).result.successful
+    assert peer.call(Trigger, 'ragdoll/reset', Trigger.Request()).success  # now it is found
     begin = time.monotonic()
     for _ in range(3):
         assert peer.call(Trigger, 'ragdoll/reset', Trigger.Request()).success

@@ -128,7 +128,9 @@ def test_all_topics_tell_of_the_same_doll(heard, peer):
     assert all(f'<link name="{name}">' in description.data for name in scene.bone_names)
     _, markers = heard['markers'][-1]
     assert {marker.ns for marker in markers.markers} >= set(scene.bone_names)
-    span = heard['markers'][-1][0] - heard['markers'][0][0]
+    # By their stamps: what has waited on a busy machine comes at once.
+    first, last = (stamp(heard['markers'][k][1].markers[-1]) for k in (0, -1))
+    span = (last - first) / SECOND
     assert len(heard['markers']) / span < 40, 'as often as a screen can use'
 
 

@@ -254,7 +254,7 @@ def test_a_ball_is_thrown_where_one_clicks(view, page, heard):
     assert thrown['doll'] == 'ball' and thrown['velocity'][0] < -9
     view.wait(lambda: page.frame.scene.dolls[-1].name == 'ball'
               and page.controls.pushes.motion.velocities()[0][0] < -0.2)
-    assert len(poses[-1][1].poses) == len(START) + 1
+    view.wait(lambda: len(poses[-1][1].poses) == len(START) + 1)
     view.page.get_by_label('Throw a ball by a click').check()
     view.wait(lambda: page.controls.ball.takes_clicks)
     view.page.mouse.move(*corner)

@@ -220,8 +220,8 @@ def caught_up_over_stalls_paces_pauses_and_resets(heard, peer, are_on_time):
     heard.warnings.clear()
     count = len(heard.stamps)
     heard.process.send_signal(signal.SIGCONT)
-    peer.wait(lambda: heard.warnings)
-    assert 'below the requested' in heard.warnings[0] or 'dropped' in heard.warnings[0]
+    peer.wait(lambda: any('below the requested' in each or 'dropped' in each
+                          for each in heard.warnings))
     peer.wait(lambda: len(heard.stamps) > count + 200)
     # From a second after the stall on; what the process had sent before it is not counted.
     first = np.argmax(np.diff(heard.stamps[count - 10:])) + count - 9
@@ -242,8 +242,9 @@ def caught_up_over_stalls_paces_pauses_and_resets(heard, peer, are_on_time):
     peer.wait(lambda: time.monotonic() > paused + 1)
     count = len(heard.stamps)
     assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=False)).success
-    peer.wait(lambda: len(heard.stamps) > count)
-    assert heard.stamps[count] - heard.stamps[count - 1] > SECOND // 2
+    # Some from before the pause may come after its answer.
+    peer.wait(lambda: len(heard.stamps) > count
+              and max(np.diff(heard.stamps[count - 1:])) > SECOND // 2)
     assert are_on_time(TICK // 2)
 
     assert peer.call(Trigger, 'ragdoll/reset', Trigger.Request()).success

@@ -466,9 +466,11 @@ def test_impacts_on_demand(page):
     wait(lambda: page.source.status.measures)
     page.source.reset()
     wait(lambda: page.frame.impacts)
-    assert all('of the limit' in arrow.text for arrow in page.frame.impacts)
+    frame = paused(page)  # while time stands they stay
+    assert frame.impacts and all('of the limit' in arrow.text for arrow in frame.impacts)
     labels = wait_for(page, '/scene/impacts_labels/0')
-    assert labels.text in {arrow.text for arrow in page.frame.impacts}
+    wait(lambda: labels.text in {arrow.text for arrow in frame.impacts})
+    page.source.pause(False)
     # The worst one of three seconds, as they are simulated apart from the page.
     wait(lambda: page.frame.time > 3)
     with Simulation(page.frame.scene) as simulation:

@@ -101,7 +101,7 @@ def test_axe_finds_nothing_serious(opened, axe, size, dark):
     for tab in ('Play', 'Edit', 'Plots'):
         view.tab(tab)
         try:
-            view.wait(lambda: not findings(), 10)
+            view.wait(lambda: not findings(), 60)
         except AssertionError:
             raise AssertionError(f'{tab}: {findings()}') from None
     page.display.dark.value = False

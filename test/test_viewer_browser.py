@@ -176,6 +176,7 @@ def test_a_run_is_recorded(view, states, tmp_path):
     open_recording(view)
     view.hold_at(SCENE, START)
     view.press('Record')
+    view.button('Stop and download').wait_for()
     go_on(view)
     view.wait(lambda: far(view, START, 0.3))  # a quarter of a second, 15 pictures
     with view.page.expect_download() as download:
@@ -210,7 +211,7 @@ def test_the_run_is_saved(view, states, tmp_path):
     assert abs(recording.positions[0] - START).max() < 1e-6
 
 
-def test_a_time_is_typed(view):
+def test_a_time_is_typed(view, states):
     """As people do, who take a while between the click and each key; and time stands there."""
     view.tab('Play')
     view.hold_at(SCENE, START)
@@ -227,6 +228,8 @@ def test_a_time_is_typed(view):
             view.page.wait_for_timeout(300)
         text = text.replace(',', '.')
         assert field.input_value() == text
+        tick = round(float(text) / SCENE.step)
+        view.wait(lambda tick=tick: index_of(view.bodies(SCENE), states) == tick)
         seen = view.bodies(SCENE)
         view.page.wait_for_timeout(1000)
         assert field.input_value() == text and (view.bodies(SCENE) == seen).all()

@@ -11,8 +11,8 @@ from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.viewer import pointer
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 
-PERIOD, PATIENCE = 0.1, 0.9
-"""s between two questions, and for an answer, in place of half a second and 2.5 s."""
+PERIOD, PATIENCE = 0.1, 2.5
+"""s between two questions, in place of half a second, and for an answer."""
 
 
 @pytest.fixture

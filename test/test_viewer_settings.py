@@ -119,7 +119,7 @@ def test_the_accuracy_by_the_dropdown_and_its_price(page):
     wait(lambda: f'{ERRORS_MM["bullet"]["normal"]} mm' in page.settings.cost.content)
     page.source.set_engine('auto')
     wait(lambda: 'tick' in page.settings.health.figures.content)
-    assert GREEN in page.settings.health.dot.content
+    wait(lambda: GREEN in page.settings.health.dot.content)
     page.client.update(page.settings.accuracy, 'exact')
     wait(lambda: page.source.status.accuracy == 'exact')
     wait(lambda: f'{ERRORS_MM["rigid"]["exact"]:g} mm' in page.settings.cost.content)

@@ -391,8 +391,11 @@ def test_plots_begin_anew_with_another_scene():
         wait(lambda: min(handle.data[0][-1:].sum() for handle in handles) > 2)
         client.update(page.controls.scene, 'flight')
         wait(lambda: page.frame.scene.name == 'flight' and page.frame.time > 1)
-        assert all(handle.visible for handle in handles)
-        assert max(handle.data[0][-1] for handle in handles) <= page.frame.time
+        # Slow motion: a busy machine plots late, yet before the run is as old as the one before.
+        page.source.set_real_time_factor(0.1)
+        wait(lambda: all(handle.visible and handle.data[0][-1] <= page.frame.time
+                         for handle in handles))
+        assert page.frame.time < 2
         client.steer(page, 'position 0.01')
         wait(lambda: not page.timeline.is_live)
         wait(lambda: all(handle.data[0][-1] < 0.5 or not handle.visible for handle in handles))
