@@ -33,6 +33,9 @@ FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
 REQUIRED = os.environ.get('RAGDOLL_BROWSER') == 'required'
 """Whether a missing browser is a failure (.ci/run) or a reason to skip."""
 
+CONNECTED = "!String(window.__viserMutable.sendMessage).includes('websocket is not connected')"
+"""Until then, viser's client only logs what it has to send."""
+
 READY = "window.__viserMutable?.scene && window.__viserMutable.nodeRefFromName['']"
 
 PLAIN = """() => {
@@ -150,9 +153,21 @@ class View:
         self.go(url)
 
     def go(self, url):
-        """Go to an address, a viewer's, and wait until the page draws."""
-        self.page.goto(url)
-        self.page.wait_for_function(READY)
+        """Go to an address, a viewer's, and wait until the page draws and is connected.
+
+        A page whose first connection takes more than 5 s tries again each second, in vain where a
+        busy machine takes longer to answer. It is loaded again then, as a user would.
+        """
+        from playwright.sync_api import TimeoutError as TooLate
+        end = time.monotonic() + PATIENCE
+        while True:
+            self.page.goto(url)
+            self.page.wait_for_function(READY)
+            try:
+                self.page.wait_for_function(CONNECTED, timeout=30_000)
+                break
+            except TooLate:
+                assert time.monotonic() < end, f'{url} does not connect'
         self.page.evaluate(PLAIN)
 
     def bodies(self, scene):
@@ -170,6 +185,12 @@ class View:
             return np.full((len(kinds), 3), np.nan)
         instances = {kind: iter(matrices) for kind, matrices in drawn.items()}
         return np.array([next(instances[kind])[12:15] for kind in kinds])
+
+    def all_bodies(self, scene):
+        """The same once all are there, which they are not for a moment after a change of one."""
+        found = []
+        self.wait(lambda: found.append(self.bodies(scene)) or np.isfinite(found[-1]).all())
+        return found[-1]
 
     def has(self, name):
         """Whether a node of this name is drawn."""
@@ -194,7 +215,7 @@ class View:
         """Wait until a condition holds, s at the most; what it said. The page goes on meanwhile."""
         end = time.monotonic() + patience
         while not (said := condition()):
-            assert time.monotonic() < end, f'not in time; notes: {self.notes()}'
+            assert time.monotonic() < end, f'not in time; notes: {self.notes()}; {self.errors}'
             self.page.wait_for_timeout(20)
         return said
 

@@ -134,7 +134,7 @@ def test_what_is_typed_is_used_to_the_digit_or_refused_in_words(view, label, eve
 
 def highlight_is_on_the_body(view):
     at = view.page.evaluate(HANDLE)
-    body = view.bodies(SCENE)[SCENE.bone_index(BONE)]
+    body = view.all_bodies(SCENE)[SCENE.bone_index(BONE)]
     return at is not None and np.abs(np.subtract(at, body)).max() < 1e-3
 
 
