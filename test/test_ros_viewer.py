@@ -33,7 +33,7 @@ from ragdoll_ros.ros.messages.convert import to_pose_array
 from ragdoll_ros.ros.messages.measures import TickMeasures, checksum, serialize_measures
 from ragdoll_ros.ros.messages.serialized import deserialize_pose_array
 from ragdoll_ros.viewer.sources.node import source as remote_source
-from ragdoll_ros.viewer.sources.node.frames import NodeFrames
+from ragdoll_ros.viewer.sources.node.frames import LATCHED_QOS, MAX_MESSAGES, NodeFrames
 from ragdoll_ros.viewer.sources.node.hands import NodeHands
 from ragdoll_ros.viewer.sources.node.pushes import ObservedPushes
 from ragdoll_ros.viewer.sources.node.scene import scene_of_node
@@ -509,6 +509,26 @@ def test_no_frame_has_the_scene_before(peer):
     assert {frame.scene.name for frame in got} == {'drop'}
     use(ponytail)
     wait(lambda: frames.newest.scene.name == 'ponytail')
+
+
+def test_lost_messages_are_told(peer, capfd):
+    """A page that draws nothing for longer than messages wait for it says how many it missed."""
+    frames = NodeFrames(peer, 'busy', NodeHands(peer, 'busy'))
+    frames.subscribe(OPEN)
+    publisher = peer.create_publisher(PoseArray, 'busy/poses', LATCHED_QOS)
+    peer.wait(publisher.get_subscription_count)
+
+    def publish_and_read(count):
+        before = frames.last_poses
+        for stamp in range(count):
+            publisher.publish(to_pose_array('world', stamp, np.ones((10, 7))))
+        wait(lambda: frames.take() or frames.last_poses != before)
+
+    for count in (1, MAX_MESSAGES):
+        publish_and_read(count)
+    assert 'lost' not in capfd.readouterr().err
+    publish_and_read(MAX_MESSAGES + 7)
+    assert '7 messages of /busy/poses were lost' in capfd.readouterr().err
 
 
 @pytest.mark.parametrize('name', ['drop', 'crowd', 'article', 'flight', 'ponytail'])

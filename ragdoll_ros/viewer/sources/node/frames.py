@@ -34,6 +34,9 @@ from .pushes import ObservedPushes
 MAX_MESSAGES = 300
 """Messages of a topic that wait to be read: 3 s of ticks, in which a page may draw nothing."""
 
+LOG_PERIOD = 1.0
+"""s between two warnings of lost messages of a topic at least."""
+
 QOS = QoSProfile(depth=MAX_MESSAGES)
 LATCHED_QOS = QoSProfile(depth=MAX_MESSAGES, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -261,6 +264,9 @@ class _NewMessages:
         self.subscription = node.create_subscription(
             topic.message, topic.name.format(name), lambda _: None, topic.qos,
             callback_group=_NotExecuted(), raw=topic.raw)
+        self._logger = node.get_logger()
+        self._number: int | None = None
+        """Of the last message: the publisher counts them; another publisher begins at 1."""
 
     def take(self) -> Iterator[object]:
         """All messages since the last call, bytes if raw."""
@@ -275,7 +281,20 @@ class _NewMessages:
                 return
             if taken is None:
                 return
-            yield taken[0]
+            message, info = taken
+            self._warn_of_lost(info['publication_sequence_number'])
+            yield message
+
+    def _warn_of_lost(self, number: int | None) -> None:
+        """Warn if messages between the last one and that of this number did not come; None: the
+        middleware does not count them.
+        """
+        if None not in (self._number, number) and number > self._number + 1:
+            self._logger.warning(
+                f'{number - self._number - 1} messages of {self.subscription.topic_name} were '
+                'lost: the network or this machine was too slow, and ticks are missing here',
+                throttle_duration_sec=LOG_PERIOD)
+        self._number = number
 
 
 class _NotExecuted(CallbackGroup):
