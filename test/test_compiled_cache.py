@@ -79,11 +79,11 @@ def test_one_process_loads_or_compiles_at_a_time(monkeypatch):
     monkeypatch.setattr(notices, 'say', lambda words: said.append(words) or told.set())
 
     def enter():
-        with cache.alone('rigid'):
+        with cache.compile_lock('rigid'):
             entered.set()
 
     other = threading.Thread(target=enter)
-    with cache.alone('rigid'):
+    with cache.compile_lock('rigid'):
         other.start()
         assert told.wait(10) and not entered.is_set()
     assert entered.wait(10)

@@ -36,8 +36,8 @@ def yet_more(x):
     return more(x) + 10
 """
 USE = """
-from tiny.compiling.cache import alone
-with alone('tiny'):
+from tiny.compiling.cache import compile_lock
+with compile_lock('tiny'):
     from tiny.outer import more, yet_more
 print(more(3.0), yet_more(3.0))
 """

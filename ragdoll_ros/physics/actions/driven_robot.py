@@ -122,7 +122,7 @@ class DrivenRobot:
         if not (pose is None and command.twist is None and command.moves_joints):
             frame_told = self._frame.told
             self._frame = _FrameMotion(begin if pose is None else pose, twist, time, True)
-        jumps, joints_told, self._arrival = kernels.tell_joints(
+        jumps, joints_told, self._arrival = kernels.set_joint_targets(
             self._address, np.concatenate(begin if pose is None else pose), told, time,
             time + tick, time + TIMEOUT, state.rows, JUMP_SPEED * tick / SECOND)
         if not jumps and pose is not None and _differ(begin, pose):

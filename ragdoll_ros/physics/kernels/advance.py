@@ -120,7 +120,9 @@ def all_moved(tree: np.ndarray) -> bool:
 
 @compiled
 def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
-    """Write the gaps at cluster.q to ws.gaps; ws.step.end becomes the kinematics of q and v."""
+    """Write all gaps at cluster.q to ws.gaps and mark them as current; ws.step.end becomes the
+    kinematics of q and v.
+    """
     start_cycles = cycles()
     update_kinematics_and_gaps(s, ws, ws.step.end, cluster.q, cluster.v, ws.gaps, math.inf,
                                ws.gaps)
@@ -143,7 +145,10 @@ def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nom
 @compiled
 def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: float,
                     nominal: float, tolerance: float) -> None:
-    """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``."""
+    """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``. It ends
+    early at a state that is not finite. Beyond the limit of impacts, steps no longer seek them;
+    beyond that of flight steps, these get a larger tolerance, then contact steps take their place.
+    """
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     start_cycles, ledger = cycles(), ws.stats[0].ledger
     time, impacts, impact_due = 0.0, 0, True
@@ -216,8 +221,9 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
 @entry(ADDRESS[::1], REAL[::1], ADDRESS[:, ::1], REAL)
 def find_islands(job: np.ndarray, windows: np.ndarray, labels: np.ndarray,
                  touching: float) -> None:
-    """Write to ``labels`` (k, d) which dolls of a cluster may meet within each of the ``windows``
-    (k,) s: the least index of the island of each doll. ``job``, ``touching``: see advance().
+    """Write to ``labels`` (k, d) which dolls of a cluster may touch within each of k durations
+    ``windows``, s: the least index of the island of each doll. ``job``, ``touching``: see
+    advance(). Computes ws.gaps and ws.step.end anew.
     """
     system, workspace, cluster = vec(job)
     s, ws, state = system_at(system), workspace_at(workspace), cluster_state_at(cluster)

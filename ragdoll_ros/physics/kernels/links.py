@@ -130,16 +130,17 @@ def displacement(link: int, links: Links, states: np.ndarray) -> tuple[Vec3, Vec
 
 
 @entry(ADDRESS, ROW, ROWS, INTEGER, INTEGER, INTEGER, ROWS, REAL)
-def tell_joints(address: int, frame: np.ndarray, told: np.ndarray, time: int, arrive: int,
+def set_joint_targets(address: int, frame: np.ndarray, told: np.ndarray, time: int, arrive: int,
                 end: int, states: np.ndarray, leap: float) -> tuple[bool, bool, int]:
-    """Let joints move from ``time`` until ``end`` by what is ``told`` (2, k): values, rad or m, and
-    rates; NaN: not told, and of those of which neither is, nothing changes. They get there until
-    ``arrive``, unless a point of a link would move by more than ``leap`` m: then the robot jumps,
-    and is to be placed at links.poses. ``frame`` (7,) is its pose, ``states`` (n, 13) are those of
-    all bones.
+    """Set the targets ``told`` (2, k) of joints from ``time`` until ``end``: values, rad or m, and
+    rates; NaN: none, and a joint with neither is not changed. A continuous joint turns the shorter
+    way. Joints reach the values at ``arrive``, ns, unless a point of a link would move by more than
+    ``leap`` m: then they have them at once, and the robot is to be placed there. Writes the poses
+    of the links to links.poses. ``frame`` (7,): pose of the robot; ``states`` (n, 13): of all
+    bones.
 
-    Returns whether it jumps, whether one of these joints was told before, and the time from which
-    on all joints stand.
+    Returns whether it jumps so, whether one of these joints had a target before, and the time from
+    which on all joints are at rest.
     """
     links, told_before, farthest, latest = links_at(address), False, 0.0, NEVER
     motions, values, rates = links.motions, told[0], told[1]
@@ -197,7 +198,9 @@ def change_twists(address: int, frame: np.ndarray, time: int, end: int,
 
 @entry(ADDRESS, INTEGER, INTEGER)
 def next_joint_change(address: int, time: int, end: int) -> int:
-    """Time after ``time``, until ``end``, at which the motion of a joint changes."""
+    """Earliest time, ns, after ``time`` and before ``end`` at which the approach or the motion of a
+    joint ends; else ``end``. ``address``: see links_at().
+    """
     links = links_at(address)
     for k in range(len(links.motions)):
         motion = links.motions[k]
@@ -211,8 +214,9 @@ def next_joint_change(address: int, time: int, end: int) -> int:
 def set_twists(q: np.ndarray, v: np.ndarray, states: np.ndarray, first_q: np.ndarray,
                first_v: np.ndarray, first_bone: np.ndarray, dolls: np.ndarray,
                twists: np.ndarray) -> None:
-    """Write the ``twists`` (m, 6) of ``dolls`` (m,) of one bone, world frame, to the coordinates q
-    and v and the states (n, 13) of a scene, in which those of doll d begin at first_q[d], ...
+    """Write the ``twists`` (m, 6), linear part first, world frame, of ``dolls`` (m,) of one bone to
+    the velocities v and the states (n, 13) of a scene; q gives the orientations. Those of doll d
+    begin at first_q[d], first_v[d] and first_bone[d].
     """
     for k in range(len(dolls)):
         doll, twist = dolls[k], twists[k]

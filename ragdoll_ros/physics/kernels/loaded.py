@@ -1,7 +1,7 @@
 """Imports the kernels, which compiles them, in one process at a time; others load them."""
-from .compiling.cache import alone
+from .compiling.cache import compile_lock
 
-with alone('rigid'):
+with compile_lock('rigid'):
     from . import advance, links
     from .collision import aabb_tree, sweep_and_prune
 

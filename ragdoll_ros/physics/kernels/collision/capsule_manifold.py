@@ -36,7 +36,9 @@ MIN_DISTANCE_RATIO = 0.1
 
 @compiled
 def closest_parameter(shape: Shape, p: Vec3, u: Vec3, half: float) -> float:
-    """Parameter t of the point of p + t u, |t| <= ``half``, nearest to the shape, in its frame."""
+    """Parameter t of the point of p + t u, |t| <= ``half``, nearest to the shape, in its frame; u
+    is a unit vector.
+    """
     if half <= 0:
         return 0.0
     if shape.kind >= BOX:

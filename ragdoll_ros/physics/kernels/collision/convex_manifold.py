@@ -114,9 +114,10 @@ def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> 
 @compiled
 def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
                 scratch: np.ndarray) -> int:
-    """Clip the incident face by the reference face, seen along n. Writes the points to ``scratch``
-    from MAX_CLIPPED on; returns their number. ``sign``: 1 if n points out of the reference, else
-    -1.
+    """Clip the incident face by the reference face, seen along n. Writes the points, midway between
+    the faces, with gaps along n, which may be positive, and feature ids, to ``scratch`` from
+    MAX_CLIPPED on; returns their number. The rest of ``scratch`` is overwritten. ``sign``: 1 if n
+    points out of the reference, else -1.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
     corners, names = (scratch[2 * MAX_CLIPPED:2 * MAX_CLIPPED + MAX_CORNERS],
@@ -183,8 +184,9 @@ def supporting_edges(a: Shape, b: Shape, n: Vec3) -> tuple[Vec3, Vec3, Vec3, Vec
 
 @compiled
 def clip_edges(middle: Vec3, u: Vec3, other: Vec3, v: Vec3, n: Vec3, points: np.ndarray) -> int:
-    """Write the ends of the overlap of parallel edges, seen along n; 2, or 0 if none. Arguments as
-    supporting_edges() returns them.
+    """Write to ``points`` the ends of the overlap of two edges seen along n, midway between them,
+    with their gaps, and 0 and 1 as feature ids. The edges are ``middle`` +- u and ``other`` +- v,
+    as of supporting_edges(). Returns 2; 0 if they are not parallel or do not overlap.
     """
     offset = sub(middle, other)
     rise, other_rise = dot(u, n), dot(v, n)

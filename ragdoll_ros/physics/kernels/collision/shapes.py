@@ -179,6 +179,9 @@ def _box_distance(size: Vec3, p: Vec3) -> tuple[float, Vec3]:
 
 @compiled
 def _cylinder_distance(size: Vec3, p: Vec3, u: Vec3) -> tuple[float, Vec3]:
+    """Signed distance, m, and outward normal of a cylinder along z at p, in its frame. On the axis
+    the normal is perpendicular to u, or along z.
+    """
     x, y, z = p
     across = math.sqrt(x * x + y * y)
     a, c = across - size[0], abs(z) - size[1]

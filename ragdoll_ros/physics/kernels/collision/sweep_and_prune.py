@@ -78,7 +78,8 @@ def set_sweep_radii(spheres: np.ndarray) -> None:
     """Write the radii, m, of spheres at rest around dolls that overlap wherever those swept along
     their displacements do.
 
-    For displacements u and v, and a common one w: |u - v| <= |u - w| + |v - w|. Where speeds count
+    For displacements u and v, and a common one w: |u - v| <= |u - w| + |v - w|. Any w is
+    right; the mean is used, to which deflected dolls contribute zero. Where speeds count
     relative to the ground, as one of a pair may be ``deflected``, the other one's sphere may be
     wider by |u|; but |u| <= |u - w| + |w|, and |w| is added to the deflected one.
     """
@@ -148,9 +149,12 @@ def find_pairs(dolls: Dolls, states: np.ndarray, moving: np.ndarray, yielding: n
     """Find the pairs of dolls that may touch within ``ahead`` s, by sweep and prune along x.
 
     ``states`` (n, 13) of all n bones. Of the d dolls: ``moving`` (d,): awake; ``yielding`` (d,):
-    not kinematic; ``clusters`` (d,): index of the cluster. A pair needs one that moves and one that
-    yields, which may be the same. Writes the pairs, lower index first, to ``pairs`` (k, 2). Returns
-    the number found; if it exceeds k, the others are not written.
+    not kinematic; ``clusters`` (d,): index of the cluster, for set_spheres(): pairs within a
+    cluster are found as well. A pair needs one that moves and one that yields, which may be the
+    same. Dolls are swept for IMPACT_SPEEDUP times ``ahead``, as impacts may make them faster; what
+    overlaps is tested by may_touch(). Writes the pairs, lower index first, to ``pairs`` (k, 2).
+    Returns the number found; if it exceeds k, the others are not written. Overwrites dolls.spheres
+    and dolls.order.
     """
     set_spheres(dolls, states, clusters, IMPACT_SPEEDUP * ahead)
     spheres, order, count, widest = dolls.spheres, dolls.order, 0, 0.0

@@ -175,10 +175,10 @@ def keep(dispatcher: Dispatcher) -> None:
 
 
 @contextlib.contextmanager
-def alone(group: str) -> Iterator[None]:
+def compile_lock(group: str) -> Iterator[None]:
     """Hold the lock of a ``group`` of kernels, so that one process at a time compiles it; those
-    that waited load what it saved. Garbage collection is off within, which saves a seventh of the
-    time.
+    that waited load what it saved. There is none where files cannot be locked. Garbage collection
+    is off within, which saves a seventh of the time. Ctrl-C prints notices.INTERRUPTED.
     """
     with contextlib.ExitStack() as stack:
         if gc.isenabled():
@@ -188,7 +188,7 @@ def alone(group: str) -> Iterator[None]:
             with contextlib.suppress(OSError, ImportError):  # a system without such locks
                 lock = os.open(FOLDER / f'{group}.lock', os.O_RDONLY | os.O_CREAT, 0o666)
                 stack.callback(os.close, lock)
-                _wait_for(lock)
+                _lock_file(lock)
         try:
             yield
         except KeyboardInterrupt:
@@ -197,7 +197,8 @@ def alone(group: str) -> Iterator[None]:
             raise
 
 
-def _wait_for(lock: int) -> None:
+def _lock_file(lock: int) -> None:
+    """Take the exclusive lock of an open file, however long it takes; after PATIENCE s, say why."""
     import fcntl
     word = threading.Timer(PATIENCE, notices.say, (notices.WAITING,))
     word.start()

@@ -41,7 +41,9 @@ def type_like(value: object) -> object:
 
 
 def entry(*types: object) -> Callable[[Callable], Callable]:
-    """Compile a function that Python calls, for these types of its arguments, when it is defined.
+    """Compile a function that Python calls, when it is defined, for exactly these types of its
+    arguments: others raise TypeError. It releases the GIL, and divides by zero without an
+    exception. Where kernels are not compiled the function is returned as it is.
 
     The code is kept for the next process, under the function's name, so the function must be at the
     top level of a module.

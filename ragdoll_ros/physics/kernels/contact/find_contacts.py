@@ -139,8 +139,9 @@ def add_pair_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
 
 @compiled
 def id_on_plane(s: System, a: int, n: Vec3, vertex: int) -> int:
-    """Id of the contact of a vertex of geom ``a`` with a face of normal n, the same on all
-    triangles of a plane: what slides from one to the next persists. It is below 0, as no other is.
+    """Id of the contact of a vertex of geom ``a`` with a face of normal n, which is rounded: the
+    same on all faces of this normal, so that what slides from one triangle to the next persists. It
+    is below 0, as no other is.
     """
     x, y = round(n[0] / SAME_DIRECTION), round(n[1] / SAME_DIRECTION)
     size = round(2 / SAME_DIRECTION) + 1
@@ -256,9 +257,10 @@ def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
 
 @compiled
 def had_met(s: System, contacts: np.ndarray, count: int, id_: int) -> bool:
-    """Whether the contact with this id was one of the ``count`` of the last step, and nearer than
-    MET or of dolls that pressed on each other, or on the ground or at limits. Not whether it
-    pressed itself: of redundant contacts rounding decides that.
+    """Whether the contact with this id was one of the ``count`` of the last step, and had a gap of
+    at most MET or any contact of the same two dolls had a normal impulse; of one doll, any contact
+    with the ground or at its limits. Its own impulse is not asked for: of redundant contacts
+    rounding decides which have one.
     """
     j = find_id(contacts, count, id_, 0)
     if j == count or contacts[j].gap <= MET:

@@ -75,8 +75,9 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
                 h: float, out: np.ndarray) -> None:
     """Write all gaps at q to ``out`` (k,) and place the geoms in ``kin``, which is that of q and of
     the current velocities. ``before``: the gaps h s earlier, from which pairs are known to be far
-    still (h infinite: unknown); may be ``out``. Reads ws.excluded and contacts.motion[].correction.
-    In a step the gaps of pairs whose points have their own are left to update_point_gaps().
+    still (h infinite: unknown); may be ``out``. Pairs in ws.excluded and those of kinematic bodies
+    alone get EXCLUDED. In a step the gaps of pairs whose points have their own are left to
+    update_point_gaps(). Reads contacts.motion[].correction, writes its speeds.
     """
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     n, narrow_phases = 0, 0
@@ -334,8 +335,8 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
 
 @compiled
 def without_internal_edges(s: System, ws: Workspace, kin: Kinematics, k: int, gap: float) -> float:
-    """Gap of pair k, m: ``gap``, or NEAR, as if it were apart, if it is a ghost collision at an
-    internal edge.
+    """Gap of pair k, m: ``gap``, or NEAR, as if it were apart, if it is less than FLUSH and a ghost
+    collision at an internal edge. Overwrites contacts.edge_manifold.
     """
     if gap < FLUSH and is_at_internal_edge(s, kin, k, ws.contacts.edge_manifold):
         return NEAR

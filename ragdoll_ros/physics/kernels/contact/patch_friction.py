@@ -174,8 +174,9 @@ def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Fac
                part: tuple[float, float, float], pressed: tuple[float, float],
                about: tuple[float, float]) -> bool:
     """Set friction points and shares of a patch that turns about a point ``about``, given from its
-    center, as the center of pressure ``pressed``; ``part``: the pressed part of its face. Returns
-    whether any has changed by more than MOVED.
+    center, as the center of pressure ``pressed``; ``part``: scale and center x, y of the pressed
+    part of its face. All points are on one line of action; where the resultant is not above WEAK,
+    each has a direction and share of its own. Returns whether any has changed by more than MOVED.
     """
     found, size, changed = contacts.found, 0.0, False
     t, w = vec(found[begin].tangents[0]), vec(found[begin].tangents[1])

@@ -43,7 +43,7 @@ def make_dynamics(bodies: int, dofs: int) -> Dynamics:
 def forward_dynamics(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
                      v: np.ndarray, kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
     """Write to ``out`` dv/dt (nv,) at q and v under gravity (3,) m/s^2, loads, joint damping
-    and passive torques. ``kin`` becomes that of q and v.
+    and passive torques; 0 of kinematic bodies. ``kin`` is updated to q and v; overwrites ``dyn``.
     """
     forward_kinematics(tree, q, v, kin)
     for i in range(len(tree)):

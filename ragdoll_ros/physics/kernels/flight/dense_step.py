@@ -135,8 +135,8 @@ def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance:
 
 @compiled
 def largest_rate(cluster: ClusterState) -> float:
-    """Largest |dq/dt|, m/s or rad/s, or |dv/dt| times SLOWEST, at the ends of a step: as
-    step_error() weighs errors.
+    """Largest component of dq/dt, and of dv/dt times SLOWEST, at both ends of a step: the weights
+    of step_error().
     """
     most = 0.0
     for end in range(2):

@@ -52,10 +52,11 @@ def time_to_close(gap: float, closing: float, acceleration: float) -> float:
 def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                          gaps: np.ndarray, acceleration: float,
                          acceleration_in_free_fall: float, end_rates: np.ndarray) -> float:
-    """Least time, s, until a gap may close; ``kin`` is that of q and v, with its geoms. Reads
-    flight.contact_gaps, overwrites contacts.manifold. No point exceeds ``acceleration``, m/s^2, nor
-    ``acceleration_in_free_fall``, relative to free fall; two bodies have twice that. ``end_rates``
-    (2, nq + nv): state derivatives at the ends of the step, for those of the limited joints.
+    """Lower bound, s, of the time until a gap falls to its flight.contact_gaps; ``kin`` is that of
+    q and v, with its geoms. Overwrites contacts.manifold. ``acceleration``, m/s^2: bound for points
+    near the ground or static geoms; ``acceleration_in_free_fall``: relative to free fall, for each
+    of two bodies that move. ``end_rates`` (2, nq + nv): state derivatives at the ends of the step,
+    for the limited joints.
     """
     least, n, contact = math.inf, 0, ws.flight.contact_gaps
     for k in range(len(s.geoms)):
@@ -145,7 +146,7 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
         update_kinematics_and_gaps(s, ws, kin, q, v, gaps, gone, gaps)
         least = least_gap(ws, gaps)
         if least < -CLOSED:
-            step.event_time = regula_falsi(s, ws, cluster, before, time)
+            step.event_time = refine_contact_time(s, ws, cluster, before, time)
             return
         if least <= CLOSED:
             step.event_time = time
@@ -195,7 +196,7 @@ def least_gap(ws: Workspace, gaps: np.ndarray) -> float:
 @compiled
 def reset_separated(ws: Workspace, gaps: np.ndarray) -> None:
     """Let gaps that have separated count as contacts when they close, at an instant before which
-    regula_falsi() will not look.
+    refine_contact_time() will not look.
     """
     for j in range(ws.gap_counts[0].fixed):
         if gaps[j] > TOUCHING:
@@ -203,9 +204,12 @@ def reset_separated(ws: Workspace, gaps: np.ndarray) -> None:
 
 
 @compiled
-def regula_falsi(s: System, ws: Workspace, cluster: ClusterState, early: float,
+def refine_contact_time(s: System, ws: Workspace, cluster: ClusterState, early: float,
                  late: float) -> float:
-    """Time, s, between ``early`` and ``late`` at which the least gap closes."""
+    """Time, s, between ``early`` and ``late`` at which the least gap is within CLOSED of 0;
+    ``early`` if it is closed then. Overwrites q, v and kinematics of ws.flight and
+    contacts.gaps_end.
+    """
     flight, gaps = ws.flight, ws.contacts.gaps_end
     above = below = 0.0
     time = early

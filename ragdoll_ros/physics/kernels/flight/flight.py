@@ -44,8 +44,10 @@ GAUSS_LEGENDRE = (
 
 @compiled
 def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> bool:
-    """Whether everything that touches separates, and for long enough; ws.gaps are current.
-    ``nominal``: length of a contact step, s. Overwrites contacts.found and ws.flight.
+    """Whether a flight may begin: no contact carried weight in the last step, all that touch
+    separate and, where any touch and dolls have joints, no gap can close within WORTHWHILE times
+    ``nominal``, the length of a contact step, s. ws.gaps are current. Overwrites contacts.found and
+    ws.flight.
     """
     q, v, stats, flight = cluster.q, cluster.v, ws.stats[0], ws.flight
     kin, g = flight.kinematics, norm(vec(s.gravity))
@@ -104,7 +106,9 @@ def contacts_separate(s: System, ws: Workspace, cluster: ClusterState, m: int) -
 def follow_dense_step(s: System, ws: Workspace, cluster: ClusterState,
                       left: float) -> tuple[float, bool]:
     """Advance cluster.q and v along the step by ``left`` s, or to its end or its first contact.
-    Returns the time advanced, s, and whether something touches.
+    Returns the time advanced, s, and whether something touches. Adds the work of loads to the
+    stats. At its end or a contact the step becomes invalid; without contact, its end rates are kept
+    for the start of the next one.
     """
     step, flight, loads = cluster.dense_step[0], ws.flight, cluster.loads
     end = min(step.length, step.event_time)

@@ -94,7 +94,8 @@ def largest(values: np.ndarray, n: int) -> float:
 @compiled
 def scale_initial_impulses(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray) -> None:
     """Scale p (n,), the impulses of the step before, by the share from 0 to 1 that minimizes
-    p (b + W p / 2): after an impact all of them would be too much.
+    p (b + W p / 2): after an impact all of them would be too much. The island's velocities are
+    left as those of the unscaled p.
     """
     write_velocities(ws, m, b, p)
     work, spent = work_terms(ws.island, n, b, p)
@@ -104,9 +105,10 @@ def scale_initial_impulses(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.n
 
 
 @compiled
-def prepare_newton(s: System, ws: Workspace, m: int) -> int:
-    """Degrees of freedom of Newton's method on an island, whose matrix has been ordered then; 0 if
-    it costs more than MAX_SWEEPS sweeps, or there is no room for it.
+def newton_dof_count(s: System, ws: Workspace, m: int) -> int:
+    """Number of degrees of freedom for Newton's method on an island, after the symbolic ordering of
+    its matrix; 0 if the method takes more work than SWEEP_WORK for each entry of a sweep, or memory
+    is short. Computed once for an island and kept in island.newton_dofs.
     """
     known = ws.island.newton_dofs
     if known[0] < 0:
@@ -136,7 +138,7 @@ def solve_rows(s: System, ws: Workspace, m: int, n: int, b: np.ndarray, p: np.nd
         done, most = done + sweeps, 2 * most
         if left <= SWEPT_SHARE * tolerance:
             break
-        dofs = prepare_newton(s, ws, m)
+        dofs = newton_dof_count(s, ws, m)
         if not dofs:
             left, sweeps = sweep_to_tolerance(ws, m, n, b, p, MAX_SWEEPS, tolerance)
             return left, done + sweeps
@@ -296,8 +298,9 @@ def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarr
 
 @compiled
 def release_opening_contacts(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> bool:
-    """Make contacts that cannot slip (friction >= NO_SLIP) frictionless, with zero impulse, if they
-    open while held sideways. Returns whether there are any.
+    """Make contacts that cannot slip (friction >= NO_SLIP) frictionless, by a friction of -1, and
+    set their impulses to zero, if they have tangential impulse but no normal one, and open faster
+    than OPENING. Returns whether there are any. island.z is not updated.
     """
     some = False
     for k in range(m):

@@ -30,7 +30,9 @@ are lists: cliques by their first index, children by their parent in the elimina
 
 
 def make_sparse_lu(n: int, sets: int, size: int) -> SparseLU:
-    """Allocate a factor of n rows with room for so many cliques of so many indices."""
+    """Allocate an LU factor of n rows, of up to ``sets`` cliques of up to ``size`` indices each,
+    with room for n min(n, ROOM) entries.
+    """
     room = n * min(n, ROOM)
 
     def indices(count: int) -> np.ndarray:

@@ -67,8 +67,8 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
-    """Whether a contact at the start of a step that was open in the last one closes so fast that it
-    is an impact: after an impact what had no part in it. After a step all closed too slowly in it.
+    """Whether a contact at the start of a step closes so fast that it is an impact, and had no part
+    in the impact that ended the last step; False if none ended that.
     """
     if ws.stats[0].ended_without_impact:
         return False
@@ -82,9 +82,10 @@ def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
 
 @compiled
 def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float) -> int:
-    """Compute one step of h s, after begin_contact_step(): step.q_end, before position correction,
-    step.v_end, step.correction, and contacts.found with their impulses. Returns the number of
-    contacts.
+    """Compute one step of h s, after begin_contact_step(): step.q_end, before position correction
+    but clipped to joint limits, step.v_end, step.correction with its energy, and contacts.found
+    with their impulses; cluster.contact_accelerations are 0 unless all contacts persist. Returns
+    the number of contacts.
 
     ``since``: time, s, since the targets of springs were at spring.target.
     """
@@ -249,7 +250,9 @@ def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since
 
 @compiled
 def clear_external(s: System, external: np.ndarray) -> None:
-    """Set impulses, moments and flags of all dolls (d,) to zero; kinematic ones are borne."""
+    """Set impulses, moments and flags of all dolls (d,) to zero; on_ground to 1 for those with a
+    kinematic bone, which bears their weight.
+    """
     for d in range(len(external)):
         own = external[d]
         own.on_ground = own.touches_other = 0

@@ -31,11 +31,13 @@ NORMAL_COLUMNS, CENTER_COLUMNS = 0, 1
 @compiled
 def log_impacts(s: System, ws: Workspace, cluster: ClusterState, m: int, in_step: bool,
                 slowest: float, time: float) -> None:
-    """Log one entry for each patch, at its center of pressure, of those of m contacts, joint limits
-    excluded, that closed faster than ``slowest``, m/s. ``time``: s since the advance began.
+    """Log an impact for each patch of the m contacts with an impulse, at its center of pressure, if
+    the patch closed faster than ``slowest``, m/s; joint limits are not logged. ``time``: s since
+    the advance began. cluster.impact_count also counts those that do not fit in the log.
 
-    After solve_contacts() of an impact, or, ``in_step``, of a step that does not seek impacts, of
-    which contacts that did not exist at its start are logged. The m contacts are changed.
+    Call it after solve_contacts() of an impact, or, ``in_step``, of a step that does not seek
+    impacts: then contacts that there were at its start are left out. Contacts of a patch are merged
+    in contacts.found.
     """
     kin, q = ws.step.start, cluster.q
     if in_step:

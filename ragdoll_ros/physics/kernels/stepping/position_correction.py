@@ -22,8 +22,9 @@ PAID_SHARE = 0.005
 
 @compiled
 def correction_energy(s: System, ws: Workspace, kin: Kinematics, correction: np.ndarray) -> float:
-    """Potential energy, J, that a displacement ``correction`` (nv,) adds. ``kin`` has all motion
-    subspaces; dynamics.composite_inertias are those of its pose.
+    """Energy, J, that a displacement ``correction`` (nv,) adds in gravity, to first order; springs
+    are not counted. ``kin`` has all motion subspaces; dynamics.composite_inertias are those of its
+    pose.
     """
     total, g = 0.0, vec(s.gravity)
     for j in range(len(correction)):

@@ -22,8 +22,9 @@ def theta_weight(rate: float) -> float:
 
 @compiled
 def implicit_damping(spring: np.record, h: float) -> float:
-    """Decrease of a spring's mean force over a step of h s per gain of its velocity, N s/m; of
-    torques N m s/rad.
+    """Minus the derivative of a spring's mean force over a step of h s by the velocity at its end,
+    N s/m; of torques N m s/rad. 0 of a saturated spring. Damping counts a half for a grab, else by
+    theta_weight().
     """
     if spring.saturated:
         return 0.0
@@ -122,8 +123,9 @@ def add_spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, s
 @compiled
 def mean_spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, v_end: np.ndarray,
                       spring: np.record, time: float, h: float) -> tuple[Vec3, Vec3]:
-    """Mean force and mean velocity of a spring, as spring_force(), in a step of h s from v to
-    ``v_end``. ``kin``, q and ``time`` are of the step's middle.
+    """Force that a spring applies in a step of h s from v to ``v_end``, and mean velocity of the
+    point that it acts on; units as of spring_force(). The force is that at v, less
+    implicit_damping() times the change of velocity. ``kin``, q and ``time``: of the step's middle.
     """
     force, start = spring_force(s, kin, q, v, spring, time)
     _, end = spring_force(s, kin, q, v_end, spring, time)

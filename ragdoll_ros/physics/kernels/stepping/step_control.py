@@ -201,8 +201,9 @@ def predict_contacts(s: System, ws: Workspace, cluster: ClusterState, h: float,
 @compiled
 def accept_step(ws: Workspace, cluster: ClusterState, m: int, length: float,
                 warm: bool) -> None:
-    """Copy the step's end to the cluster, and if ``warm`` its m contacts and its ``length``, s, for
-    the warm start of the next step.
+    """Copy the step's end to the cluster and its gaps to ws.gaps; contact points are no longer
+    tracked. If ``warm``, keep the m contacts in the cluster, and m and ``length``, s, in ws.stats,
+    for the warm start of the next step.
     """
     if warm:
         for i in range(m):

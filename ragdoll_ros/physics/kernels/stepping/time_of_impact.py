@@ -72,11 +72,14 @@ def open_bracket(ws: Workspace) -> None:
 
 @compiled
 def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: bool) -> bool:
-    """Make a step of h s the high end of the bracket, if something is ``overshot`` at its end, or
-    its low end, unless something has ``landed``. Returns whether to try another length.
+    """Make a step of h s the high end of the bracket, if a gap at its end is ``overshot``, below
+    OVERSHOT, else its low end, unless a gap that closes fast has ``landed``, at LANDED or less:
+    then its impact is found. Returns whether to try another length: not where the bracket has no
+    high end or is as short as SHORTEST.
 
-    Gaps are kept less AIM; those at an end that stays twice are weighted:
-    anderson_bjorck_weight().
+    Gaps are kept less AIM. At the high end only those count that are below OVERSHOT and either were
+    negative at the high end before or are fast impacts; the others are EXCLUDED. Those at an end
+    that stays twice are weighted: anderson_bjorck_weight().
     """
     bracket, low, high, end = (ws.step.bracket[0], ws.step.gaps_low, ws.step.gaps_high,
                                ws.contacts.gaps_end)

@@ -33,10 +33,11 @@ def jam_threshold(s: System, ws: Workspace, h: float) -> float:
 def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) -> None:
     """Set the initial impulses of m found contacts, by id: those of contacts.tried, the last trial
     of this step, else those of ``known``, the last step, scaled by the ratio of step lengths, else
-    0. Marks those that are persistent, and gives them start velocities by take_start().
+    0. Marks as persistent those that there were at the start of the step, where impacts are not
+    sought except new fast ones, and gives them start velocities by take_start().
 
-    Impulses of jammed contacts are undetermined and would grow from step to step: above
-    jam_threshold(), all begin at zero.
+    Impulses of jammed contacts are undetermined and would grow from step to step: if the sum of the
+    scaled normal impulses exceeds jam_threshold(), all begin at zero.
     """
     stats, pressed = ws.stats[0], 0.0
     tried_count = ws.step.scalars[0].tried_count

@@ -15,8 +15,8 @@ from ..maths.vectors import Vec3, dot, put, vec
 from .bone_path import set_bones
 from .collide import advance_among
 from .colliders import move_out
-from .link_step import (limited, outward, place, root_forces, root_frame, set_response, step_link,
-                        tip_frame)
+from .link_step import (limited, outward, root_forces, root_frame, set_frame, set_response,
+                        step_link, tip_frame)
 from .links import COLLIDER, LINK, LINK_STATE, RESPONSE, Around, Chains, Frame
 
 MAX_SUBSTEPS = 64
@@ -104,7 +104,7 @@ def begin_chains(chains: Chains, states: np.ndarray, bones: np.ndarray, has_dire
         else:
             frame = tip_frame(chains.links[link.parent], states[link.parent], math.inf)
         d = vec(state.direction) if has_directions else outward(frame, vec(link.rest))
-        place(link, state, frame, d)
+        set_frame(link, state, frame, d)
         if not has_rates:
             put(state.rate, vec(state.drift))
         if chains.firsts[chain] < chains.lasts[chain]:

@@ -70,9 +70,9 @@ def try_step(chains: Chains, states: np.ndarray, chain: int, h: float, bones_bef
 
 
 @compiled
-def gap_before(chains: Chains, chain: int, bones: np.ndarray) -> float:
-    """Least gap, m, of chains.before: of all pairs of a tip and a collider that are more than TOUCH
-    apart. ``bones`` (b, 13): their states at that time.
+def least_gap_before(chains: Chains, chain: int, bones: np.ndarray) -> float:
+    """Least gap, m, of those above TOUCH between the tips and colliders of a chain, at the link
+    states chains.before and the bone states ``bones`` (b, 13) of the same time; FREE if none.
     """
     least = FREE
     for k in range(chains.starts[chain], chains.ends[chain]):
@@ -90,7 +90,7 @@ def step_to_arrival(chains: Chains, states: np.ndarray, chain: int, high: float,
     """Step a chain to the first instant, s, at which a tip touches what it did not, before
     ``high``, where the gap is ``high_gap``. By regula falsi with the factors of Illinois.
     """
-    low, low_gap, span = 0.0, gap_before(chains, chain, bones_before), high
+    low, low_gap, span = 0.0, least_gap_before(chains, chain, bones_before), high
     side = 0
     for search in range(SEARCHES):
         share = low_gap / (low_gap - high_gap)

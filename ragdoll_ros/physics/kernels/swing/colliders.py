@@ -22,7 +22,7 @@ from ..maths.transcendental import arc
 from ..maths.vectors import (Vec3, add, add_scaled, cross, dot, norm, put, quat_rotate, scale, sub,
                              vec)
 from .bone_path import orientation_of
-from .link_step import place, step_link, tangential
+from .link_step import set_frame, step_link, tangential
 from .links import Around, Frame
 from .sphere import exp_map
 
@@ -66,7 +66,8 @@ def tip_contact(link: np.ndarray, state: np.ndarray, collider: np.ndarray,
 
     Returns the gap, m; the unit tangent at the link's direction d along which d turns away from the
     collider; the angle, rad, by which d must turn along it to reach the surface, negative outside;
-    the derivative of the gap by that angle, m/rad; and the rate of the gap, m/s.
+    the derivative of the gap by that angle, m/rad; and the rate of the gap, m/s. The gap is FREE,
+    and the rest zero, where no direction is clear of the collider.
     """
     d, root, length = vec(state.direction), vec(state.point), link.length
     tip = add_scaled(root, length, d)
@@ -122,7 +123,7 @@ def move_out(link: np.ndarray, state: np.ndarray, frame: Frame, around: Around) 
                 is_inside = True
                 d, _ = exp_map(vec(state.direction), scale(angle, out))
                 put(state.rate, tangential(d, vec(state.rate)))
-                place(link, state, frame, d)
+                set_frame(link, state, frame, d)
         if not is_inside:
             return
 

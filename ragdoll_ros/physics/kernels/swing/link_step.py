@@ -124,9 +124,10 @@ def tip_frame(link: np.ndarray, state: np.ndarray, most: float) -> Frame:
 
 
 @compiled
-def place(link: np.ndarray, state: np.ndarray, frame: Frame, d: Vec3) -> None:
+def set_frame(link: np.ndarray, state: np.ndarray, frame: Frame, d: Vec3) -> None:
     """Write the ``frame`` at a link's root and its unit direction d to ``state`` (LINK_STATE), and
-    what follows from these, to_rest, rad, and drift, 1/s. The rate is not changed.
+    what follows from these: to_rest, the log map from d to the rest direction, rad, and drift, the
+    rate of d if it were fixed in the frame, 1/s. The rate is not changed.
     """
     put(state.point, frame.point)
     put(state.velocity, frame.velocity)
@@ -178,19 +179,20 @@ def step_link(link: np.ndarray, r: np.ndarray, state: np.ndarray, frame: Frame,
         add_scaled(scale(r.v_start, start), -r.end_rest, left)))
     d, chord = exp_map(d, x)
     v, left = transported(v, x, chord), transported(left, x, chord)
-    place(link, state, frame, d)
+    set_frame(link, state, frame, d)
     v = add(v, add_scaled(scale(r.end_rest, vec(state.to_rest)), r.end_drift, vec(state.drift)))
     if link.stiffness > 0:
-        v = bounded(link, r, state, v, left)
+        v = limit_rate(link, r, state, v, left)
     put(state.rate, add_scaled(v, r.end_force, tangential(d, end)))
 
 
 @compiled
-def bounded(link: np.ndarray, r: np.ndarray, state: np.ndarray, v: Vec3, left: Vec3) -> Vec3:
-    """Limit a rate to the energy before the correction of the spring force.
+def limit_rate(link: np.ndarray, r: np.ndarray, state: np.ndarray, v: Vec3, left: Vec3) -> Vec3:
+    """Rate v, of which the part relative to the frame is scaled down where it has more energy than
+    before the correction of the spring force.
 
     Energy is |v|^2 + w |log|^2, relative to the frame; ``left`` is the log map that the model
-    gives. If the frame turns about the link by phi in the step, the true log map leads the
+    gives. If the frame turns about the link by 2 phi in the step, the true log map leads the
     model's by phi, and the true rate lags by phi. Rotating the model's by -phi keeps the sum of
     both energies to third order in the step; without it the limit would reduce the order to 1.
     """

@@ -8,11 +8,11 @@ import contextlib
 from ..compiling.available import ready
 
 if ready():
-    from ..compiling.cache import alone
+    from ..compiling.cache import compile_lock
 else:
     alone = contextlib.nullcontext
 
-with alone('swings'):
+with compile_lock('swings'):
     from ..maths import oscillator
     from . import advance_chains, chain_modes
 

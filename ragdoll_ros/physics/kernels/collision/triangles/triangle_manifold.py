@@ -167,8 +167,8 @@ def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
     for i in range(number):
         vertex, before = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
         is_corner = before >= MAX_CORNERS and vertex.feature_id >= MAX_CORNERS
-        if goes_on(found.edges, vertex.feature_id) or (
-                goes_on(found.edges, before) and not is_corner):
+        if is_flat_or_concave(found.edges, vertex.feature_id) or (
+                is_flat_or_concave(found.edges, before) and not is_corner):
             continue
         height = dot(n, vec(vertex.point))
         put(points[count].point, add_scaled(vec(vertex.point), -(height / 2), n))
@@ -182,9 +182,9 @@ def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
 
 
 @compiled
-def goes_on(edges: Vec3, side: int) -> bool:
-    """Whether ``side``, an id of clip_polygon(), is an edge beyond which the surface goes on, flat
-    or bent up.
+def is_flat_or_concave(edges: Vec3, side: int) -> bool:
+    """Whether ``side``, an id of clip_polygon(), is one of the triangle's sides, from MAX_CORNERS
+    on, and its edge flat or concave. ``edges``: bend at each side, positive where convex.
     """
     return side >= MAX_CORNERS and not edges[min(side - MAX_CORNERS, 2)] > FLAT
 
