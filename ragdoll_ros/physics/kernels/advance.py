@@ -146,8 +146,9 @@ def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nom
 def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: float,
                     nominal: float, tolerance: float) -> None:
     """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``. It ends
-    early at a state that is not finite. Beyond the limit of impacts, steps no longer seek them;
-    beyond that of flight steps, these get a larger tolerance, then contact steps take their place.
+    early at a state that is not finite. There is no flight with springs. Beyond the limit of
+    impacts, which is 0 for many bodies, steps no longer seek them; beyond that of flight steps,
+    these get a larger tolerance, then contact steps take their place.
     """
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     start_cycles, ledger = cycles(), ws.stats[0].ledger

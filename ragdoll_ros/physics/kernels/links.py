@@ -131,13 +131,13 @@ def displacement(link: int, links: Links, states: np.ndarray) -> tuple[Vec3, Vec
 
 @entry(ADDRESS, ROW, ROWS, INTEGER, INTEGER, INTEGER, ROWS, REAL)
 def set_joint_targets(address: int, frame: np.ndarray, told: np.ndarray, time: int, arrive: int,
-                end: int, states: np.ndarray, leap: float) -> tuple[bool, bool, int]:
+                      end: int, states: np.ndarray, leap: float) -> tuple[bool, bool, int]:
     """Set the targets ``told`` (2, k) of joints from ``time`` until ``end``: values, rad or m, and
     rates; NaN: none, and a joint with neither is not changed. A continuous joint turns the shorter
     way. Joints reach the values at ``arrive``, ns, unless a point of a link would move by more than
-    ``leap`` m: then they have them at once, and the robot is to be placed there. Writes the poses
-    of the links to links.poses. ``frame`` (7,): pose of the robot; ``states`` (n, 13): of all
-    bones.
+    ``leap`` m: then they have them at once, and the robot is to be placed there. Writes the
+    poses of the links to links.poses: those at ``time``, with the values reached at once. ``frame``
+    (7,): pose of the robot; ``states`` (n, 13): of all bones.
 
     Returns whether it jumps so, whether one of these joints had a target before, and the time from
     which on all joints are at rest.

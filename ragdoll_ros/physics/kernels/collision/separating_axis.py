@@ -102,9 +102,9 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
 @compiled
 def _hull_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -> Axis:
     """face_or_edge_axis() where a or b is a hull. Edges are tried only if the best face axis
-    overlaps by more than DEEP_RATIO times the smaller bounding radius. ``bias``: factor of what a
-    face of b must separate more than those of a, and an edge more than faces. Returns the first
-    face axis that separates by more than ``cutoff``.
+    overlaps by more than DEEP_RATIO times the smaller bounding radius. ``bias``: factor of the
+    margin, FACE_BIAS and its ratio, by which a face of b must separate more than those of a, and an
+    edge more than faces. Returns the first face axis that separates by more than ``cutoff``.
     """
     s, axis, bar = -MAX_PENETRATION, (0.0, 0.0, 0.0), -MAX_PENETRATION
     for body in range(2):

@@ -75,8 +75,8 @@ def set_spheres(dolls: Dolls, states: np.ndarray, clusters: np.ndarray, ahead: f
 
 @compiled
 def set_sweep_radii(spheres: np.ndarray) -> None:
-    """Write the radii, m, of spheres at rest around dolls that overlap wherever those swept along
-    their displacements do.
+    """Write sweep_radius, m: of spheres at rest around dolls that overlap wherever those swept
+    along their displacements do. It is radius + |u - w|; ground_radius + |w| if ``deflected``.
 
     For displacements u and v, and a common one w: |u - v| <= |u - w| + |v - w|. Any w is
     right; the mean is used, to which deflected dolls contribute zero. Where speeds count

@@ -71,7 +71,9 @@ def _places() -> list[Path]:
 
 
 def _serves(place: Path) -> bool:
-    """Whether a folder has this version's code already, even if read-only, or can be written to."""
+    """Whether a folder has this version's code already, even if read-only, or can be written to. It
+    is created if there is none.
+    """
     try:
         if any(place.glob(f'*-{KEY}.nbc')):
             return True

@@ -75,8 +75,9 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
                 h: float, out: np.ndarray) -> None:
     """Write all gaps at q to ``out`` (k,) and place the geoms in ``kin``, which is that of q and of
     the current velocities. ``before``: the gaps h s earlier, from which pairs are known to be far
-    still (h infinite: unknown); may be ``out``. Pairs in ws.excluded and those of kinematic bodies
-    alone get EXCLUDED. In a step the gaps of pairs whose points have their own are left to
+    still (h infinite: unknown); may be ``out``. Pairs in ws.excluded, those of kinematic or
+    static bodies alone, and points and limits of kinematic bodies get EXCLUDED; without ground its
+    gaps are not written. In a step the gaps of pairs whose points have their own are left to
     update_point_gaps(). Reads contacts.motion[].correction, writes its speeds.
     """
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
@@ -303,7 +304,9 @@ def mark_joints_outside(s: System, q: np.ndarray, outside: np.ndarray) -> None:
 
 @compiled
 def limit_violated_between(s: System, contacts: Contacts, i: int, j: int) -> bool:
-    """Whether a joint on the path between bodies i and j is marked in contacts.joint_outside."""
+    """Whether a joint on the path between bodies i and j, or to both roots if their dolls differ,
+    is marked in contacts.joint_outside.
+    """
     while i != j:
         if i < j:
             i, j = j, i

@@ -100,8 +100,9 @@ def apply_inverse_factor(dof_parent: np.ndarray, L: np.ndarray, island: Island, 
 @compiled
 def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                        c: np.record) -> None:
-    """Write the velocities along a contact's rows to c.start_velocity, that about its normal to
-    c.spin; ``kin``: of q and v.
+    """Write the velocities along a contact's rows, of body a relative to b, to c.start_velocity:
+    normal at c.point, tangential at c.friction_point, then rolling; that about the normal to
+    c.spin. Of a joint limit only the first. ``kin``: of q and v.
     """
     start = c.start_velocity
     c.spin = 0.0

@@ -70,8 +70,9 @@ def measure_face(s: System, contacts: Contacts, kin: Kinematics, begin: int, end
 def measure_segment(c: np.record, count: int, middle: Vec3, u: np.ndarray,
                     v: np.ndarray) -> tuple[Vec3, Face]:
     """Center, m, world, and Face of a patch whose ``count`` points are on a line: the segment that
-    they span. ``u``, ``v``: coordinates of the points along c.tangents, from ``middle``, m; the
-    first two become the ends of the segment, from its center.
+    they span, as its half and the pseudo-inverse of its second moments, 1/m^2. ``u``, ``v``:
+    coordinates of the points along c.tangents, from ``middle``, m; the first two become the ends of
+    the segment, from its center.
     """
     far = 0
     for k in range(count):

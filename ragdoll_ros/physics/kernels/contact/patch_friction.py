@@ -175,8 +175,9 @@ def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Fac
                about: tuple[float, float]) -> bool:
     """Set friction points and shares of a patch that turns about a point ``about``, given from its
     center, as the center of pressure ``pressed``; ``part``: scale and center x, y of the pressed
-    part of its face. All points are on one line of action; where the resultant is not above WEAK,
-    each has a direction and share of its own. Returns whether any has changed by more than MOVED.
+    part of its face. All points are put on one line through ``about``, spread along it; where the
+    resultant is not above WEAK, each gets a direction and share of its own, or stays where that has
+    no strength. Returns whether any has changed by more than MOVED.
     """
     found, size, changed = contacts.found, 0.0, False
     t, w = vec(found[begin].tangents[0]), vec(found[begin].tangents[1])

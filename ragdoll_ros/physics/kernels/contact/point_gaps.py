@@ -173,9 +173,9 @@ def is_contact_of_step(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
                        at: np.record, h: float) -> bool:
     """Whether a point of pair k, ``at``, found at the middle of a step of h s, is a contact of it.
 
-    A tracked point is if its gap in contacts.gaps_active counts as touching. Any other is if its
-    gap, extrapolated to the start of the step, is at most SLOW h: too small for an impact. ``kin``:
-    of q and v at the middle.
+    A tracked point is one if its gap in contacts.gaps_active is at most scalars.touching. Any other
+    is one if its gap, extrapolated to the start of the step where it approaches, is at most SLOW h:
+    too small for an impact. ``kin``: of q and v at the middle.
     """
     i = find_point(ws, k, at.feature_id)
     if i != NONE:

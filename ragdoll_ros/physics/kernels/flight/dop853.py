@@ -109,8 +109,9 @@ def weighted_sum(weights: np.ndarray, count: int, k: np.ndarray, h: float, out: 
 
 @compiled
 def step_error(k: np.ndarray, h: float, nq: int, scratch: np.ndarray) -> float:
-    """DOP853's estimate of the error of a step of h s (Hairer, Norsett, Wanner, II.10): the largest
-    over coordinates, m or rad, and velocities times SLOWEST; infinity if a number is not finite.
+    """DOP853's estimate of the error of a step of h s (Hairer, Norsett, Wanner, II.10), of the
+    largest errors of orders 5 and 3: those of coordinates, m or rad, and of velocities times
+    SLOWEST, where Hairer takes the mean squares. Infinity if a number is not finite.
     ``k`` (16, nq + nv): derivatives at the stages. ``scratch`` (nq + nv,).
     """
     fifth, third, all_of_it = 0.0, 0.0, 0.0

@@ -44,10 +44,10 @@ GAUSS_LEGENDRE = (
 
 @compiled
 def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> bool:
-    """Whether a flight may begin: no contact carried weight in the last step, all that touch
-    separate and, where any touch and dolls have joints, no gap can close within WORTHWHILE times
-    ``nominal``, the length of a contact step, s. ws.gaps are current. Overwrites contacts.found and
-    ws.flight.
+    """Whether a flight may begin: no contact carried weight in the last step, unless that ended
+    with an impact, all that touch separate and, where any touch and dolls have joints, no gap can
+    close within WORTHWHILE times ``nominal``, the length of a contact step, s. ws.gaps are current.
+    Overwrites contacts.found and ws.flight.
     """
     q, v, stats, flight = cluster.q, cluster.v, ws.stats[0], ws.flight
     kin, g = flight.kinematics, norm(vec(s.gravity))

@@ -76,8 +76,9 @@ def solve_active_set(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarra
 
 @compiled
 def initial_active_set(island: Island, m: int, p: np.ndarray) -> int:
-    """Write the rows that stick and the normals with an impulse to island.places, and which rows
-    are normals to island.is_normal. Returns the active rows' number; p of all others becomes 0.
+    """Write the active rows to island.places: the tangents of all contacts with unlimited friction
+    (NO_SLIP), then the normals with an impulse; to island.is_normal which rows are normals. Returns
+    the number of active rows; p of all others is set to 0.
     """
     count, members, places = 0, island.members, island.places
     for k in range(m):

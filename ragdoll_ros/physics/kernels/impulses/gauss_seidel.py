@@ -74,7 +74,8 @@ def gauss_seidel_sweep(members: np.ndarray, m: int, n: int, W: np.ndarray, b: np
 @compiled
 def solve_rolling(W: np.ndarray, n: int, a: int, p: np.ndarray, u: np.ndarray,
                   most: float) -> float:
-    """Solve for the rolling impulse of rows a and a + 1, at most ``most`` N m s; p and u follow.
+    """Improve the rolling impulse of rows a and a + 1, at most ``most`` N m s, by four projected
+    gradient steps; p and u follow.
     Returns the largest change of an angular velocity, rad/s.
     """
     w11, w12, w22 = W[a * n + a], W[a * n + a + 1], W[(a + 1) * n + a + 1]

@@ -94,8 +94,8 @@ def largest(values: np.ndarray, n: int) -> float:
 @compiled
 def scale_initial_impulses(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray) -> None:
     """Scale p (n,), the impulses of the step before, by the share from 0 to 1 that minimizes
-    p (b + W p / 2): after an impact all of them would be too much. The island's velocities are
-    left as those of the unscaled p.
+    p (b + W p / 2): after an impact all of them would be too much. Overwrites the island's
+    velocities with those of the unscaled p.
     """
     write_velocities(ws, m, b, p)
     work, spent = work_terms(ws.island, n, b, p)

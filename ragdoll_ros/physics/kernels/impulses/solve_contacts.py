@@ -186,9 +186,9 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
 
 @compiled
 def set_correction(ws: Workspace, member: np.record, c: np.record, h: float) -> None:
-    """Write to ``member`` the ``correction`` of the gap in h s, m or rad, and its compliance, which
-    contacts with the world do not have. It is CORRECTED_SHARE of a penetration beyond SLOP, up to
-    a greatest speed; where impacts are not sought, minus the gap of a contact that is new.
+    """Write to ``member`` the ``correction`` of the gap in h s, m or rad: CORRECTED_SHARE of a
+    penetration beyond SLOP, up to a greatest speed; where impacts are not sought, minus the gap of
+    a contact that is new, at any speed. Also its correction_compliance, if it is of two bodies.
     """
     fastest = MAX_LIMIT_SPEED if c.kind == LIMIT else MAX_SEPARATION_SPEED
     member.correction = min(CORRECTED_SHARE * max(0.0, -c.gap - SLOP), fastest * h)

@@ -48,8 +48,10 @@ OPENING = 1e-4
 
 
 @compiled
-def project_to_cones(members: np.ndarray, m: int, p: np.ndarray) -> None:
-    """Project impulses p to their friction cones: no normal one is negative."""
+def clamp_to_cones(members: np.ndarray, m: int, p: np.ndarray) -> None:
+    """Clamp normal impulses of p to at least zero, then friction and rolling impulses to discs of
+    as much times their coefficient; where friction is unlimited (NO_SLIP) it is not changed.
+    """
     for c in range(m):
         member = members[c]
         a = member.row
@@ -80,7 +82,7 @@ def solve_cones(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, to
         if convex and solve_active_set(island, m, n, b, p, tolerance):
             return tolerance, done
         left = newton(island, m, n, b, p, tolerance, proximal)
-        project_to_cones(island.members, m, p)
+        clamp_to_cones(island.members, m, p)
         if turn < LOOSER:
             tolerance = max(tolerance, min(10 * tolerance, UNSOLVED))
         if left <= tolerance:

@@ -285,7 +285,9 @@ def add_contact_row(island: Island, k: int, x: int) -> None:
 
 @compiled
 def find_direction(island: Island, m: int) -> None:
-    """Write dp = -C^-1 (phi + B Y dz) to island.direction; dz: island.z_direction, by places."""
+    """Write dp = -C^-1 (phi + B Y dz) to island.direction. island.phi and island.B have been
+    multiplied by C^-1, multiply_rows(); dz: island.z_direction, in the order of elimination.
+    """
     for k in range(m):
         member, B, phi = island.members[k], island.B[k], island.phi[k]
         slide = island.local

@@ -67,8 +67,8 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
-    """Whether a contact at the start of a step closes so fast that it is an impact, and had no part
-    in the impact that ended the last step; False if none ended that.
+    """Whether a contact of contacts.start, the start of a step, closes so fast that it is an
+    impact, and had no part in the impact that ended the last step; False if none ended that.
     """
     if ws.stats[0].ended_without_impact:
         return False

@@ -36,8 +36,8 @@ def log_impacts(s: System, ws: Workspace, cluster: ClusterState, m: int, in_step
     the advance began. cluster.impact_count also counts those that do not fit in the log.
 
     Call it after solve_contacts() of an impact, or, ``in_step``, of a step that does not seek
-    impacts: then contacts that there were at its start are left out. Contacts of a patch are merged
-    in contacts.found.
+    impacts: then persistent contacts are not logged, and their normal impulses in contacts.found
+    become zero. Contacts of a patch are merged there.
     """
     kin, q = ws.step.start, cluster.q
     if in_step:

@@ -140,8 +140,9 @@ def saturate_springs(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, v
     """Write saturated_force, and ``saturated`` 1, to springs whose mean force from v to ``v_free``
     would exceed max_force. Returns whether there are any. ``kin``, q, ``time``: of the middle.
 
-    The direction is that at v: far away, the mean is askew, by what an unlimited force would do in
-    the step. A joint's two directions cannot be, and one at v may be over at once.
+    The force has the direction of that at v: the mean of a force without limit, far from its
+    target, turns within the step. Of a joint spring, and where that at v is zero, it has that of
+    the mean.
     """
     some = False
     for k in range(len(springs)):

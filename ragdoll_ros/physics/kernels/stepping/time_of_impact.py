@@ -75,7 +75,7 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
     """Make a step of h s the high end of the bracket, if a gap at its end is ``overshot``, below
     OVERSHOT, else its low end, unless a gap that closes fast has ``landed``, at LANDED or less:
     then its impact is found. Returns whether to try another length: not where the bracket has no
-    high end or is as short as SHORTEST.
+    high end, or is as short as SHORTEST, or the step itself is, or it is not above the low end.
 
     Gaps are kept less AIM. At the high end only those count that are below OVERSHOT and either were
     negative at the high end before or are fast impacts; the others are EXCLUDED. Those at an end

@@ -33,8 +33,9 @@ def jam_threshold(s: System, ws: Workspace, h: float) -> float:
 def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) -> None:
     """Set the initial impulses of m found contacts, by id: those of contacts.tried, the last trial
     of this step, else those of ``known``, the last step, scaled by the ratio of step lengths, else
-    0. Marks as persistent those that there were at the start of the step, where impacts are not
-    sought except new fast ones, and gives them start velocities by take_start().
+    0. Marks as persistent those of contacts.start, and gives them start velocities by
+    take_start(). Where impacts are not sought, a new contact that closes fast is not persistent:
+    one that is not in ``known`` or had a gap above MET there.
 
     Impulses of jammed contacts are undetermined and would grow from step to step: if the sum of the
     scaled normal impulses exceeds jam_threshold(), all begin at zero.

@@ -67,7 +67,7 @@ def tip_contact(link: np.ndarray, state: np.ndarray, collider: np.ndarray,
     Returns the gap, m; the unit tangent at the link's direction d along which d turns away from the
     collider; the angle, rad, by which d must turn along it to reach the surface, negative outside;
     the derivative of the gap by that angle, m/rad; and the rate of the gap, m/s. The gap is FREE,
-    and the rest zero, where no direction is clear of the collider.
+    the tangent of any length and the rest zero, where no direction is clear of the collider.
     """
     d, root, length = vec(state.direction), vec(state.point), link.length
     tip = add_scaled(root, length, d)
