@@ -268,11 +268,17 @@ class View:
         self.page.close()
 
 
+def start_of(scene):
+    """Place of each bone at the start of a scene (n, 3) m."""
+    return np.array([placement.bone_pose(bone)[0]
+                     for placement in scene.dolls for bone in placement.doll.bones])
+
+
 @contextmanager
 def opened(browser, url, scene, size=SIZE, first=False):
     """A page at an address, with all bones in it; no script of it has failed at the end.
 
-    ``first``: of a scene that waits for its first page: until it falls.
+    ``first``: of a scene that waits for its first page: until it falls, or lies, on a busy machine.
     """
     view = View(browser, url, size)
     try:
@@ -280,8 +286,8 @@ def opened(browser, url, scene, size=SIZE, first=False):
         # The page hears keys once its panel is drawn, which a busy browser does later.
         view.page.locator('.ragdoll-bar [data-do=toggle][aria-label]').wait_for()
         if first:
-            before = view.bodies(scene)
-            view.wait(lambda: abs(view.bodies(scene) - before).max() > 0.01)
+            start = start_of(scene)
+            view.wait(lambda: abs(view.bodies(scene) - start).max() > 0.01)
         yield view
     finally:
         view.close()

@@ -7,7 +7,7 @@ import urllib.parse
 
 import numpy as np
 import pytest
-from browser import chromium, opened, serving
+from browser import chromium, opened, serving, start_of
 from geometry_msgs.msg import PoseArray
 from network import Network
 from peer import end, kill, listening, start
@@ -16,7 +16,7 @@ from visualization_msgs.msg import InteractiveMarkerFeedback
 from ragdoll_ros.files.scene import load_scene
 
 SCENE = load_scene('drop')
-START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+START = start_of(SCENE)
 TORSO = 0
 
 LIFT = np.array((0, 0, 0.1))

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from browser import chromium, opened, serving
+from browser import chromium, opened, serving, start_of
 from geometry_msgs.msg import PoseArray, Wrench
 from peer import listening
 from std_msgs.msg import String
@@ -15,7 +15,7 @@ from std_msgs.msg import String
 from ragdoll_ros.files.scene import load_scene
 
 SCENE = load_scene('drop')
-START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+START = start_of(SCENE)
 
 FLIGHT = load_scene('flight')
 MASSES = np.array([bone.mass for bone in FLIGHT.bones])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from browser import chromium, opened
+from browser import chromium, opened, start_of
 from geometry_msgs.msg import PoseArray, Wrench
 from page_client import served
 from peer import PATIENCE, kill, listening, start
@@ -21,7 +21,7 @@ from ragdoll_ros.viewer.sources.node.source import NodeSource
 SCENE = load_scene('flight')
 """Free space, where nothing but pushes moves the doll."""
 
-START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+START = start_of(SCENE)
 MASSES = np.array([bone.mass for bone in SCENE.bones])
 CENTER = MASSES @ START / MASSES.sum()
 

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from browser import View, chromium, serving
+from browser import View, chromium, serving, start_of
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.viewer.page import DISCONNECTED
 
 SCENE = load_scene('drop')
-START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+START = start_of(SCENE)
 ARM = SCENE.bone_index('left_forearm')
 
 SAID = """() => {
@@ -37,8 +37,7 @@ def test_software_rendering_a_grab_and_a_lost_viewer():
         with serving('--port', '0', '--scene', 'drop') as url:
             view = View(context, url)
             view.wait(lambda: np.isfinite(view.bodies(SCENE)).all())
-            before = view.bodies(SCENE)  # it falls once it is seen
-            view.wait(lambda: abs(view.bodies(SCENE) - before).max() > 0.01)
+            view.wait(lambda: abs(view.bodies(SCENE) - START).max() > 0.01)  # once it is seen
             note = view.page.get_by_text('WebGL is running in software mode')
             assert 'check that hardware acceleration is enabled' in note.text_content()
             check_grab(view)

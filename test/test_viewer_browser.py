@@ -12,7 +12,7 @@ import fit_rigs
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from browser import PATIENCE, SHARPNESS, View, chromium, opened, serving
+from browser import PATIENCE, SHARPNESS, View, chromium, opened, serving, start_of
 from conftest import ROOT
 from samples import FLAIL_SDF
 from test_fit_broken import BROKEN
@@ -26,7 +26,7 @@ from ragdoll_ros.recordings.recording import Recording
 from ragdoll_ros.recordings.save import FORMATS
 
 SCENE = load_scene('drop')
-START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+START = start_of(SCENE)
 
 
 @pytest.fixture(scope='module')

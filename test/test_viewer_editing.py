@@ -5,13 +5,13 @@ import itertools
 
 import numpy as np
 import pytest
-from browser import editing
+from browser import editing, start_of
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.viewer.editor import changes
 
 SCENE = load_scene('drop')
-START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+START = start_of(SCENE)
 BONE = 'left_shin'
 NUMBERS = itertools.count()
 

@@ -1,11 +1,10 @@
 """The page's button that ends animations, in headless Chromium."""
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from browser import chromium, opened, serving
+from browser import chromium, opened, serving, start_of
 from conftest import ROOT
 
 from ragdoll_ros.files.doll import save_doll
@@ -40,7 +39,7 @@ def view(path):
 
 def test_the_button_fells_who_walks_and_a_reset_lets_it_walk(view, path):
     scene = load_scene(path)
-    start = np.array([scene.dolls[0].bone_pose(bone).position for bone in scene.bones])
+    start = start_of(scene)
     with Simulation(scene) as simulation:
         walks = simulation.run(1)[0, :, :3]
         simulation.go_limp()

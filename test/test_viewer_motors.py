@@ -1,11 +1,10 @@
 """The page's slider for the strength of motors, in headless Chromium."""
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from browser import chromium, opened
+from browser import chromium, opened, start_of
 from page_client import served
 
 from ragdoll_ros.files.scene import load_scene
@@ -51,7 +50,7 @@ def fells_the_doll(page, view, scene, is_set):
     """
     limp, held = (places_after(scene, strength) for strength in (0.0, 0.9))
     assert abs(limp - held).max() > 0.3
-    start = np.array([scene.dolls[0].bone_pose(bone).position for bone in scene.bones])
+    start = start_of(scene)
     view.hold_at(scene, start)
     assert float(slider(view).get_attribute('aria-valuenow')) == 0.9
 
