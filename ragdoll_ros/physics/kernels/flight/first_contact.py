@@ -205,7 +205,7 @@ def reset_separated(ws: Workspace, gaps: np.ndarray) -> None:
 
 @compiled
 def refine_contact_time(s: System, ws: Workspace, cluster: ClusterState, early: float,
-                 late: float) -> float:
+                        late: float) -> float:
     """Time, s, between ``early`` and ``late`` at which the least gap is within CLOSED of 0;
     ``early`` if it is closed then. Overwrites q, v and kinematics of ws.flight and
     contacts.gaps_end.

@@ -10,7 +10,7 @@ from ..compiling.available import ready
 if ready():
     from ..compiling.cache import compile_lock
 else:
-    alone = contextlib.nullcontext
+    compile_lock = contextlib.nullcontext
 
 with compile_lock('swings'):
     from ..maths import oscillator
