@@ -11,7 +11,7 @@ TOPICS = {'ragdoll/poses': PoseArray, 'ragdoll/measures': DiagnosticArray,
           'ragdoll/swings': PoseArray}
 """Those that late listeners get something of."""
 
-HISTORY = 10
+HISTORY = 50
 """Messages of such a topic that late listeners get while others listen, too."""
 
 SECOND = 1_000_000_000
@@ -57,8 +57,8 @@ def test_who_comes_at_any_instant_gets_the_present(make_node, peer, topic, durab
     """At 20 random instants, running or paused, after others that came, went or still listen.
 
     The first message is at most one tick old, and a latched one comes without a further tick. Where
-    others heard the last tick, latched listeners first get the last ten messages, which end at the
-    present.
+    others heard the last tick, latched listeners first get the last fifty messages, which end
+    at the present.
     """
     rng, node = np.random.default_rng(37), make_node(scene='ponytail')
     others = Listeners(node, peer, topic, durability)

@@ -72,7 +72,7 @@ class Outputs:
         self._swings: LatchedTopic | None = None
         self._contacts = overridable_publisher(node, PoseArray, '~/contacts', 10)
         self._wrenches = overridable_publisher(node, MultiDOFJointState, '~/contact_wrenches', 10)
-        self._markers = LatchedTopic(node, MarkerArray, '~/markers')
+        self._markers = LatchedTopic(node, MarkerArray, '~/markers', LATCHED_HISTORY)
         self._urdf_trees = PerDoll(urdf_tree)
         self._templates: SceneTemplates | None = None
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
