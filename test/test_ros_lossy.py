@@ -1,12 +1,9 @@
 """A network that loses packets: the page lacks no tick, as what is lost is sent again."""
 import itertools
 import json
-import os
-import subprocess
-import sys
 
 import pytest
-from conftest import ROOT, light
+from network_namespace import run_in_network
 
 SECONDS = 30
 
@@ -47,17 +44,7 @@ finally:
 @pytest.mark.slow
 def test_no_tick_is_lost_where_a_fifth_of_all_packets_is():
     """With ten messages to send again, some ten of 6 000 ticks were."""
-    def in_a_network(*command):
-        return ['unshare', '--net', 'sh', '-c', NETWORK, 'sh', *command]
-
-    tried = subprocess.run(in_a_network('true'), capture_output=True, text=True)
-    if tried.returncode:
-        pytest.skip(f'no network namespaces, or no nft: {tried.stderr.strip()}')
-    done = subprocess.run(
-        in_a_network(sys.executable, '-c', PAGE), capture_output=True, text=True, timeout=300,
-        env={**light(), 'PYTHONPATH': os.pathsep.join([str(ROOT), *sys.path[1:]]),
-             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_DOMAIN_ID': '7',
-             'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'})
+    done = run_in_network(NETWORK, PAGE, timeout=300)
     assert done.stdout, done.stderr
     frames = json.loads(done.stdout)
     assert len(frames) >= SECONDS * 100 and {run for run, _ in frames} == {frames[0][0]}

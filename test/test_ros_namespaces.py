@@ -1,14 +1,8 @@
 """Three nodes on three machines of a network, as far as Linux plays them, and one who listens."""
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
-from conftest import light
-
-ROOT = Path(__file__).resolve().parent.parent
+from network_namespace import run_in_network
 
 NETWORK = """
 set -e
@@ -82,25 +76,9 @@ finally:
 """
 
 
-def in_a_network(*command):
-    """Words of a command that runs a program beside the three machines."""
-    return ['unshare', '--net', '--mount', 'sh', '-c', NETWORK, 'sh', *command]
-
-
 @pytest.mark.slow
 def test_all_are_heard_and_a_cut_link_recovers():
-    try:
-        tried = subprocess.run(in_a_network('true'), capture_output=True, text=True)
-    except FileNotFoundError as error:
-        pytest.skip(f'no network namespaces: {error}')
-    if tried.returncode:
-        pytest.skip(f'no network namespaces: {tried.stderr.strip()}')
-    done = subprocess.run(
-        in_a_network(sys.executable, '-c', LISTENER), capture_output=True, text=True, timeout=240,
-        env={**light(), 'PYTHONPATH': os.pathsep.join([str(ROOT), *sys.path[1:]]),
-             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_DOMAIN_ID': '7',
-             # One kernel has one /dev/shm: by it nodes would reach each other past the network.
-             'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'})
+    done = run_in_network(NETWORK, LISTENER, timeout=240)
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     first, cut, third = told['while_cut']

@@ -20,7 +20,7 @@ lost on their way, as a message that is not yet acknowledged makes room for a ne
 TICK_HISTORY = QoSProfile(depth=50, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """For small messages of each tick, of which none is to be lost: what is lost on its way is sent
 again while it is kept. Where a fifth of all packets is lost (test_ros_lossy.py), 9 of 5 600 ticks
-are with a depth of 10, and none with this one. Who comes late to a hundred dolls waits as long."""
+are with a depth of 10, none with this one. A late subscriber waits no longer for it."""
 
 
 class InvalidQosOverride(RagdollError):
