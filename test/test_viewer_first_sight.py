@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip('viser')
+from browser import start_of
 from page_client import served, wait
 
 from ragdoll_ros.files.scene import load_scene
@@ -16,7 +17,7 @@ from ragdoll_ros.viewer.sources.source import RequestedData
 from ragdoll_ros.viewer.start_when_visible import StartWhenVisible
 
 SCENE = load_scene('drop')
-START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+START = start_of(SCENE)
 
 
 class Client:
