@@ -20,7 +20,9 @@ NOT_READY = 'Nothing to compile with: {}; the node runs engine bullet then'
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; the exit code: 2 if nothing can be compiled."""
+    """Compile the kernels that every simulation calls. ``arguments``: of the command line, None for
+    sys.argv. Returns the exit code: 0, or 2 if kernels cannot be compiled here.
+    """
     argparse.ArgumentParser(
         'python -m ragdoll_ros.physics.kernels', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter).parse_args(arguments)

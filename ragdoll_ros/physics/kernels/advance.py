@@ -85,7 +85,7 @@ workspace_at, cluster_state_at = bundle_at(WORKSPACE), bundle_at(CLUSTER_STATE)
 
 @compiled
 def is_finite(values: np.ndarray) -> bool:
-    """Whether all values (k,) and their sum are finite."""
+    """Whether the sum of ``values`` (k,) is finite; it is not if a value is not."""
     total = 0.0
     for j in range(len(values)):
         total += values[j]
@@ -111,7 +111,9 @@ def write_bone_states(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
 
 @compiled
 def all_moved(tree: np.ndarray) -> bool:
-    """Whether all bodies are MOVED, at constant velocities."""
+    """Return whether all bodies of ``tree`` (n,) are of the kinematic kind MOVED, see
+    dynamics/body.py. Their velocities are then constant.
+    """
     moved = True
     for i in range(len(tree)):
         moved &= tree[i].kinematic == MOVED
@@ -133,7 +135,10 @@ def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
 @compiled
 def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nominal: float,
                tolerance: float) -> None:
-    """Begin a dense step, with its first contact, if everything separates; ws.gaps are current."""
+    """Begin a flight if can_fly(): make a dense step and find its first contact. dense_step.valid,
+    which must be 0, becomes 1 if one has begun. ws.gaps must be current. With loads, which may
+    change then, the step lasts at most ``left``, s. ``nominal``: length of a contact step, s.
+    """
     start_cycles = cycles()
     longest = min(left, LONGEST_FLIGHT) if len(cluster.loads) else LONGEST_FLIGHT
     if can_fly(s, ws, cluster, nominal) and begin_dense_step(s, ws, cluster, tolerance, longest):
@@ -145,10 +150,11 @@ def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nom
 @compiled
 def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: float,
                     nominal: float, tolerance: float) -> None:
-    """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``. It ends
-    early at a state that is not finite. There is no flight with springs. Beyond the limit of
-    impacts, which is 0 for many bodies, steps no longer seek them; beyond that of flight steps,
-    these get a larger tolerance, then contact steps take their place.
+    """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``. Stops
+    early if the state is not finite. With springs there is no flight. Two limits, by the number of
+    bodies, bound the work. Beyond that of impacts, 0 for many bodies, contact steps no longer seek
+    times of impact; beyond MAX_IMPACTS no flight begins. Beyond that of flight steps the tolerance
+    is multiplied by CUT_TOLERANCE; after as many more, only contact steps follow.
     """
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     start_cycles, ledger = cycles(), ws.stats[0].ledger
@@ -222,9 +228,10 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
 @entry(ADDRESS[::1], REAL[::1], ADDRESS[:, ::1], REAL)
 def find_islands(job: np.ndarray, windows: np.ndarray, labels: np.ndarray,
                  touching: float) -> None:
-    """Write to ``labels`` (k, d) which dolls of a cluster may touch within each of k durations
-    ``windows``, s: the least index of the island of each doll. ``job``, ``touching``: see
-    advance(). Computes ws.gaps and ws.step.end anew.
+    """Write to ``labels`` (k, d) the islands of a cluster's d dolls for each of k durations
+    ``windows``, s: the least index among the dolls that each may touch within that time, directly
+    or through others. ``job`` (3,): a row of ``jobs`` of advance(); ``touching``: see there.
+    Computes ws.gaps and ws.step.end anew.
     """
     system, workspace, cluster = vec(job)
     s, ws, state = system_at(system), workspace_at(workspace), cluster_state_at(cluster)
@@ -240,12 +247,13 @@ def find_islands(job: np.ndarray, windows: np.ndarray, labels: np.ndarray,
 def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float,
             solve_error: float, touching: float) -> None:
     """Advance clusters independently by ``duration`` s and write their bone states and doll sums.
-    ``duration`` 0: only recompute these and the gaps.
+    ``duration`` 0: recompute these and the gaps, and clear the exclusion flags of pairs that have
+    separated, see enable_separated_pairs(); q and v stay.
 
     ``jobs`` (k, 3): addresses of the bundles of system, workspace and state of each. ``step``:
     nominal length of a step in contact, s; ``tolerance``: error of a step of flight, m or rad;
     ``solve_error``: residual of the contact solve as a share of a speed, see Accuracy;
-    ``touching``: gap that counts as contact, m.
+    ``touching``: gap that counts as contact, m or rad.
     """
     for k in range(len(jobs)):
         system, workspace, cluster = vec(jobs[k])

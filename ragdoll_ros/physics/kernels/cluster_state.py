@@ -111,7 +111,9 @@ some. Input: ``loads``, ``springs``."""
 
 
 def make_cluster_state(system: System, contacts: int = 0) -> ClusterState:
-    """A cluster state at the origin, at rest, with room for so many contacts."""
+    """Make a cluster state with room for ``contacts`` contacts. All values are 0, also the
+    quaternions in q, which the caller must write.
+    """
     nv, nq = len(system.dof_parent), coordinate_count(system)
     return ClusterState(
         q=np.zeros(nq), v=np.zeros(nv), dense_output=np.zeros((8, nq + nv)),

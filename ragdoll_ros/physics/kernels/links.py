@@ -53,7 +53,9 @@ last call."""
 
 def make_links(joints: np.ndarray, motions: np.ndarray, place: np.ndarray, reach: np.ndarray,
                bones: np.ndarray) -> Links:
-    """Links of which nothing has been computed yet."""
+    """Make the Links of a robot from its tables, see Links. Poses are zero and twists infinite
+    (unknown).
+    """
     n = len(place)
     return Links(joints, motions, np.zeros((len(joints) + 1, 7)), place, bones, reach,
                  np.zeros((n, 7)), np.full((n, 6), np.inf), np.zeros(n, np.bool_))
@@ -70,7 +72,9 @@ INTEGER, INDICES, ROW, ROWS = (type_like(each) for each in (
 
 @compiled
 def value_at(motion: np.record, time: int) -> float:
-    """Value of a driven joint at ``time``, rad or m."""
+    """Return the value of a driven joint, rad or m, at ``time``, ns: linear from motion.begin to
+    the motion until approach_end, then by motion.value and rate, constant from motion.end on.
+    """
     if time < motion.approach_end:
         span = motion.approach_end - motion.since
         goal = motion.value + span / SECOND * motion.rate
@@ -80,7 +84,7 @@ def value_at(motion: np.record, time: int) -> float:
 
 @compiled
 def arrival(motion: np.record) -> int:
-    """Time from which on a joint stands."""
+    """Return the time, ns, from which on a joint is at rest."""
     return max(motion.approach_end, motion.end) if motion.rate != 0.0 else motion.approach_end
 
 
@@ -121,8 +125,8 @@ def rotation_vector(turn: Quat) -> Vec3:
 
 @compiled
 def displacement(link: int, links: Links, states: np.ndarray) -> tuple[Vec3, Vec3]:
-    """What takes a link from where it is in ``states`` (n, 13) to its pose, m, and rad about an
-    axis.
+    """Return the translation, m, and the rotation vector, rad, both in the world frame, that take a
+    link from its pose in ``states`` (n, 13) to links.poses.
     """
     state, pose = states[links.bones[link]], links.poses[link]
     return sub(vec(pose), vec(state)), rotation_vector(
@@ -132,15 +136,17 @@ def displacement(link: int, links: Links, states: np.ndarray) -> tuple[Vec3, Vec
 @entry(ADDRESS, ROW, ROWS, INTEGER, INTEGER, INTEGER, ROWS, REAL)
 def set_joint_targets(address: int, frame: np.ndarray, told: np.ndarray, time: int, arrive: int,
                       end: int, states: np.ndarray, leap: float) -> tuple[bool, bool, int]:
-    """Set the targets ``told`` (2, k) of joints from ``time`` until ``end``: values, rad or m, and
-    rates; NaN: none, and a joint with neither is not changed. A continuous joint turns the shorter
-    way. Joints reach the values at ``arrive``, ns, unless a point of a link would move by more than
-    ``leap`` m: then they have them at once, and the robot is to be placed there. Writes the
-    poses of the links to links.poses: those at ``time``, with the values reached at once. ``frame``
+    """Set the targets of driven joints from ``time`` until ``end``, ns. ``told`` (2, k): values,
+    rad or m, and rates; NaN: not given. Joints with neither are not changed. Without a rate, a
+    joint stays at the value; without a value, it moves on from where it is. A continuous joint
+    turns the shorter way. The target is the value plus the rate times the time since ``time``;
+    joints reach it at ``arrive``, ns. But if that may move a point of a link by more than ``leap``
+    m, the robot jumps: the joints are at their targets at once, and the caller must place the robot
+    there. Writes to links.poses the poses at ``time``, with the values reached at once. ``frame``
     (7,): pose of the robot; ``states`` (n, 13): of all bones.
 
-    Returns whether it jumps so, whether one of these joints had a target before, and the time from
-    which on all joints are at rest.
+    Returns whether the robot jumps, whether a joint with a new target had one before, and the time,
+    ns, from which on all joints are at rest.
     """
     links, told_before, farthest, latest = links_at(address), False, 0.0, NEVER
     motions, values, rates = links.motions, told[0], told[1]
@@ -172,9 +178,10 @@ def set_joint_targets(address: int, frame: np.ndarray, told: np.ndarray, time: i
 @entry(ADDRESS, ROW, INTEGER, INTEGER, ROWS)
 def change_twists(address: int, frame: np.ndarray, time: int, end: int,
                   states: np.ndarray) -> int:
-    """Write to links.twists those that take all links from where they are in ``states`` (n, 13) at
-    ``time`` to where their joints are at ``end``, when the robot's ``frame`` is at a pose (7,).
-    Those that differ by rounding stay. Returns how many changed.
+    """Write to links.twists the constant twists that take all links from their poses in ``states``
+    (n, 13) at ``time`` to those at ``end``, ns, when the robot's ``frame`` is at a pose (7,).
+    Twists that differ from the last ones by rounding are kept. Marks those that changed in
+    links.changed and returns their number. Writes links.poses, at ``end``.
     """
     links, seconds = links_at(address), (end - time) / SECOND
     bound, count = ROUNDING / seconds, 0
@@ -215,8 +222,9 @@ def set_twists(q: np.ndarray, v: np.ndarray, states: np.ndarray, first_q: np.nda
                first_v: np.ndarray, first_bone: np.ndarray, dolls: np.ndarray,
                twists: np.ndarray) -> None:
     """Write the ``twists`` (m, 6), linear part first, world frame, of ``dolls`` (m,) of one bone to
-    the velocities v and the states (n, 13) of a scene; q gives the orientations. Those of doll d
-    begin at first_q[d], first_v[d] and first_bone[d].
+    v and to the states (n, 13) of a scene. In v the angular part is in the bone's own frame, by its
+    orientation in q. Coordinates, velocities and states of doll d begin at first_q[d], first_v[d]
+    and first_bone[d].
     """
     for k in range(len(dolls)):
         doll, twist = dolls[k], twists[k]

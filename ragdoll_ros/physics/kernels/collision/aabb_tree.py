@@ -26,7 +26,9 @@ what is beyond these is empty. ``stack``: scratch."""
 
 
 def make_aabb_tree(lower: np.ndarray, upper: np.ndarray) -> AabbTree:
-    """The tree of boxes with the corners ``lower`` and ``upper`` (m, 3), m."""
+    """Build the AABB tree of boxes with the corners ``lower`` and ``upper`` (m, 3), in m: a
+    complete binary tree with its leaves along a Morton curve.
+    """
     order = _along_curve((lower + upper) / 2)
     leaves = 1 << max(0, len(order) - 1).bit_length()
     low, high = np.full((2 * leaves, 3), np.inf), np.full((2 * leaves, 3), -np.inf)
@@ -71,9 +73,11 @@ STATES, REACH, MASK, KEYS = (type_like(each) for each in (
 @entry(TREE, STATES, REACH, MASK, type_like(0.0), KEYS)
 def find_near(tree: AabbTree, states: np.ndarray, reach: np.ndarray, moving: np.ndarray,
               ahead: float, keys: np.ndarray) -> int:
-    """Write to ``keys`` (k,) bone * m + box, for each ``moving`` bone (n,) and each of the m boxes
-    that it may touch within ``ahead`` s. Returns how many there are, also if k are fewer.
-    ``states`` (n, 13) of all bones; ``reach`` (n,) m.
+    """Find the boxes of ``tree`` that each bone of the mask ``moving`` (n,) may touch within
+    ``ahead`` s: by its bounding sphere of radius ``reach`` (n,), m, widened by MARGIN and by its
+    motion at IMPACT_SPEEDUP times its speed. Writes bone * m + box, of m boxes, to ``keys`` (k,).
+    Returns the number found; if it exceeds k, the others are not written. ``states`` (n, 13): of
+    all bones.
     """
     count, boxes, leaves = 0, len(tree.order), len(tree.lower) // 2
     for i in range(len(states)):

@@ -55,7 +55,8 @@ def closest_parameter(shape: Shape, p: Vec3, u: Vec3, half: float) -> float:
 
 @compiled
 def _find_minimum(shape: Shape, p: Vec3, u: Vec3, half: float) -> float:
-    """Parameter t of the least signed distance: the root of its slope, which increases with t.
+    """Parameter t, |t| <= ``half``, of the least signed distance: the root of its slope, which
+    increases with t, or an end of the segment if the slope does not change its sign.
 
     The Illinois method, with bisection at every third step: deep in a shape the slope jumps.
     """
@@ -95,7 +96,9 @@ def _slope(shape: Shape, p: Vec3, u: Vec3, t: float) -> float:
 @compiled
 def _clip_to_slab(interval: tuple[float, float], p: float, u: float,
                   width: float) -> tuple[float, float]:
-    """The part of an interval of t where |p + t u| <= ``width``; end < start if empty."""
+    """The part of an interval of t where |p + t u| <= ``width``; end < start if empty. p and u are
+    components along the slab's normal.
+    """
     lo, hi = interval
     if abs(u) < 1e-12:
         return (lo, hi) if abs(p) <= width else (1.0, 0.0)
@@ -105,7 +108,9 @@ def _clip_to_slab(interval: tuple[float, float], p: float, u: float,
 
 @compiled
 def _clip_to_half_space(interval: tuple[float, float], p: float, u: float) -> tuple[float, float]:
-    """The part of an interval of t where p + t u <= 0; end < start if empty."""
+    """The part of an interval of t where p + t u <= 0; end < start if empty. p: height above the
+    plane at t = 0; u: its slope.
+    """
     lo, hi = interval
     if abs(u) < 1e-12:
         return (lo, hi) if p <= 0 else (1.0, 0.0)
@@ -114,7 +119,10 @@ def _clip_to_half_space(interval: tuple[float, float], p: float, u: float) -> tu
 
 @compiled
 def _clip_to_face(shape: Shape, p: Vec3, u: Vec3, half: float, n: Vec3) -> tuple[float, float]:
-    """Interval of t where p + t u is above the shape's face of normal n; end < start if empty."""
+    """Interval of t, |t| <= ``half``, where p + t u is above the support along the contact normal
+    n; end < start if empty. Shape's frame. Limits: a cap's rim; the ends of a capsule or a
+    cylinder's side; the faces of a box or hull whose normals have less than FACE_SINE along n.
+    """
     size, interval = shape.size, (-half, half)
     if shape.kind == BOX:
         if abs(n[0]) < FACE_SINE:
@@ -158,9 +166,11 @@ def capsule_separation(a: Shape, b: Shape) -> float:
 @compiled
 def capsule_manifold(a: Shape, b: Shape, margin: float, sign: float,
                      manifold: np.ndarray) -> int:
-    """Write the manifold of a sphere or capsule a with any shape b to ``manifold``, as collide().
-    ``sign``: factor of the normals, -1 if the caller has swapped the shapes. Points: the deepest,
-    and where the axis enters and leaves the space above the face below it.
+    """Write the manifold of a sphere or capsule a with a solid shape b to ``manifold``, as
+    collide(). ``sign``: factor of the normals, -1 if the caller has swapped the shapes. Points:
+    where the axis enters and leaves the space above b's nearest face (feature ids 0 and 1), and the
+    deepest (DEEPEST), unless an end is as deep. If the axis enters a box, cylinder or hull, only
+    the deepest.
     """
     c, radius, half = sub(a.position, b.position), a.size[0], a.size[1]
     p, u = to_local(b.rotation, c), to_local(b.rotation, column(a.rotation, 2))
@@ -197,7 +207,9 @@ def capsule_manifold(a: Shape, b: Shape, margin: float, sign: float,
 @compiled
 def _put_ball(contact: np.record, b: Shape, center: Vec3, n: Vec3, distance: float, radius: float,
               sign: float) -> None:
-    """Write the contact of a ball with ``center`` (b's frame) ``distance`` m from b's surface."""
+    """Write the point, normal and gap of the contact of a ball with b. ``center``, normal ``n``: in
+    b's frame; ``distance``, m: of the center from b's surface.
+    """
     point = to_world(b.rotation, add_scaled(center, -((distance + radius) / 2), n))
     put(contact.point, add(b.position, point))
     put(contact.normal, scale(sign, to_world(b.rotation, n)))

@@ -55,7 +55,9 @@ CLOSEST_POINTS_ID = 2 * MAX_CORNERS * 2 * MAX_CORNERS - 1
 
 @compiled
 def _contact_axis(a: Shape, b: Shape, c: Vec3, margin: float) -> Axis:
-    """The best face normal, unless another axis is clearly better; c: from b's center to a's."""
+    """Find the best face normal, unless another axis is clearly better. Returns an Axis; any with a
+    separation above ``margin``, m, will do. ``c``: from b's center to a's.
+    """
     sat = face_or_edge_axis(a, b, c, 1.0, margin)
     if sat[0] <= margin and needs_search(a, b):
         refined = refine_axis(a, b, c, sat)
@@ -155,8 +157,10 @@ def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
 @compiled
 def _feature_id(has_hull: bool, face: int, incident_face: int, of_b: int, side: int, end: int,
                 corner: int) -> int:
-    """Id of a point on the reference face, which is b's where ``of_b`` is 1: of the faces and of
-    the sides before and after it, or where both are the incident face's of its corner.
+    """Pack the id of a contact point on the reference face ``face``, which is b's where ``of_b`` is
+    1: from both faces and the sides of the clipped polygon before and after the point, ``side`` and
+    ``end``. If both are sides of the incident face, the point is its ``corner``: from the reference
+    face and ``corner`` alone. ``has_hull``: whether one of the shapes is a hull.
     """
     is_corner = side < MAX_CORNERS and end < MAX_CORNERS
     if not has_hull:
@@ -213,7 +217,10 @@ def clip_edges(middle: Vec3, u: Vec3, other: Vec3, v: Vec3, n: Vec3, points: np.
 
 @compiled
 def closest_on_edges(middle: Vec3, u: Vec3, other: Vec3, v: Vec3, n: Vec3, s: float) -> Vec3:
-    """Midpoint, m, of the closest points of edges or vertices that are s apart along n."""
+    """Midpoint, m, of the closest points of the edges ``middle`` +- u, of a, and ``other`` +- v, of
+    b, that are s apart along n, from b to a. Of a vertex u or v is 0. The origin of the result is
+    that of ``middle`` and ``other``.
+    """
     offset = sub(other, middle)
     rise, other_rise, height = dot(u, n), dot(v, n), dot(offset, n)
     uu, vv = dot(u, u) - rise * rise, dot(v, v) - other_rise * other_rise

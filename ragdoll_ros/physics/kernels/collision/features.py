@@ -27,11 +27,11 @@ MAX_CORNERS = len(OCTAGON)
 
 @compiled
 def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tuple[int, int]:
-    """Write the corners of the face that supports along the unit vector n (world) to ``corners``,
-    from the shape's center, m, world axes. Returns their number (4: face, 8: cap, 2: line of a
-    side, 3 to 8: face of a hull, where feature ids are its vertices) and the face's id. A cap has
-    the corners of a regular octagon, except that the one closest to the support point is put there;
-    if all of the cap supports, that closest to direction ``t``.
+    """Write to ``corners`` the corners of the face that supports along the unit vector n (world),
+    from the shape's center, m, world axes. Returns their number and the face's id. Box: 4. Hull: 3
+    to 8; the feature ids are its vertices. Cylinder: the 2 ends of a line of its side, face 2, or
+    the 8 corners of a cap: a regular octagon whose corner closest to the support point is moved to
+    that point; if all of the cap supports, to the rim point farthest along ``t``.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == HULL:
@@ -86,7 +86,7 @@ def _box_face(shape: Shape, n: Vec3, corners: np.ndarray) -> int:
 @compiled
 def corner_id(shape: Shape, face: int, k: int) -> int:
     """Id, below MAX_CORNERS, of corner k of a face with this id, see supporting_face(): of a box
-    the same on all three faces that share it.
+    the same on all three faces that share the corner, of other shapes k.
     """
     if shape.kind != BOX:
         return k
@@ -97,8 +97,8 @@ def corner_id(shape: Shape, face: int, k: int) -> int:
 
 @compiled
 def face_cosine(shape: Shape, n: Vec3) -> float:
-    """Cosine between n (world) and the closest normal of a box's or hull's face or a cylinder's
-    cap.
+    """Cosine between n (world) and the normal of a face: of a box the closest one, of a cylinder
+    the closest cap's, of a hull that of supporting_hull_face().
     """
     x, y, z = to_local(shape.rotation, n)
     if shape.kind == HULL:

@@ -106,7 +106,9 @@ def _nearest_on_segment(simplex: np.ndarray, i: int, j: int) -> Nearest:
 
 @compiled
 def _nearest_on_triangle(simplex: np.ndarray, i: int, j: int, m: int) -> Nearest:
-    """The same on a triangle; inside along its normal, which is accurate in slivers too."""
+    """Nearest to the origin on the triangle i j m: squared distance, point, bits of the vertices
+    used. A point inside is found along the normal, which is accurate in slivers too.
+    """
     a, b, c = vec(simplex[i].point), vec(simplex[j].point), vec(simplex[m].point)
     n = cross(sub(b, a), sub(c, a))
     square = dot(n, n)

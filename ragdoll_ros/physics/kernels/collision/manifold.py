@@ -82,5 +82,6 @@ def _swap(a: np.record, b: np.record) -> None:
 
 @compiled
 def _squared_distance(a: np.record, b: np.record) -> float:
+    """Squared distance, m^2, between the points of two CLIP_VERTEX records."""
     difference = sub(vec(a.point), vec(b.point))
     return dot(difference, difference)

@@ -22,8 +22,8 @@ from .triangles.triangle_manifold import triangle_manifold
 @compiled
 def collide(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
     """Write the contact manifold of two shapes to ``manifold``: points with a gap of at most
-    ``margin``, m, and normals from b to a, world. ``manifold`` has room for MAX_MANIFOLD_POINTS of
-    CONTACT_POINT. Returns the number of points.
+    ``margin``, m, and normals from b to a, world. A triangle must be b; neither may be a plane.
+    ``manifold`` has room for MAX_MANIFOLD_POINTS of CONTACT_POINT. Returns the number of points.
     """
     c = sub(a.position, b.position)
     reach = bounding_radius(a) + bounding_radius(b) + margin
@@ -42,7 +42,8 @@ def collide(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
 @compiled
 def separation(a: Shape, b: Shape, cutoff: float) -> float:
     """Signed distance of two shapes, m: positive if and only if they are disjoint. If it exceeds
-    ``cutoff``, a lower bound that does so too may be returned.
+    ``cutoff``, a lower bound that does so too may be returned. A triangle must be b: see
+    triangle_separation(); the rest is for other shapes.
 
     It is continuous; while the shapes touch, its rate is the relative velocity along the normal.
     Disjoint shapes: the distance, of two boxes the largest separation along an axis of SAT.

@@ -63,10 +63,12 @@ def separation_along(a: Shape, b: Shape, c: Vec3, n: Vec3) -> float:
 
 @compiled
 def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -> Axis:
-    """SAT: the axis of largest separation among face normals and cross products of edges.
+    """SAT: find the Axis of largest separation among face normals and cross products of edges. With
+    a hull, edges are only tried where the overlap is deep, see _hull_axis().
 
     The axis of a capsule a counts as an edge. A ``bias`` of 1, not 0, prefers a's faces to b's and
-    these to edges. The first axis with a separation above ``cutoff`` ends the search.
+    these to edges. The first axis with a separation above ``cutoff`` ends the search; with a hull
+    only a face's does. ``c``: offset of a's center from b's, m.
     """
     if a.kind == HULL or b.kind == HULL:
         return _hull_axis(a, b, c, bias, cutoff)
@@ -101,10 +103,11 @@ def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -
 
 @compiled
 def _hull_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -> Axis:
-    """face_or_edge_axis() where a or b is a hull. Edges are tried only if the best face axis
-    overlaps by more than DEEP_RATIO times the smaller bounding radius. ``bias``: factor of the
-    margin, FACE_BIAS and its ratio, by which a face of b must separate more than those of a, and an
-    edge more than faces. Returns the first face axis that separates by more than ``cutoff``.
+    """face_or_edge_axis() where a or b is a hull. The first face axis with a separation above
+    ``cutoff`` ends the search. Edges are tried only if the best face axis overlaps by more than
+    DEEP_RATIO times the smaller bounding radius. Faces of b must separate more than those of a, and
+    edges more than faces, by ``bias`` * (FACE_BIAS + FACE_BIAS_RATIO * |best separation
+    before|).
     """
     s, axis, bar = -MAX_PENETRATION, (0.0, 0.0, 0.0), -MAX_PENETRATION
     for body in range(2):
@@ -153,8 +156,8 @@ def _faces(shape: Shape) -> tuple[int, int]:
 
 @compiled
 def _face(shape: Shape, k: int, towards: Vec3) -> tuple[Vec3, float]:
-    """Face normal k, world, of two that which does not point against ``towards``; and the extent,
-    m, of the shape along it.
+    """Face normal k, world, and the extent, m, of the shape along it. Of the two opposite normals
+    of a box or cylinder it is the one that does not point against ``towards``.
     """
     if shape.kind == HULL:
         normal, offset = hull_plane(shape.system, k)
@@ -181,7 +184,9 @@ def _edge(shape: Shape, k: int) -> Vec3:
 
 @compiled
 def _supports(shape: Shape, edge: int, n: Vec3) -> bool:
-    """Whether an edge of a hull, perpendicular to n, supports along n; of other shapes True."""
+    """Whether an edge of a hull supports along n (world), which is perpendicular to it. True of
+    other shapes.
+    """
     return shape.kind != HULL or is_supporting_edge(
         shape.system, edge, to_local(shape.rotation, n))
 
@@ -203,7 +208,7 @@ def _towards(c: Vec3, n: Vec3) -> Vec3:
 @compiled
 def refine_axis(a: Shape, b: Shape, c: Vec3, start: Axis) -> Axis:
     """Improve ``start``, the best face or edge axis, until the separation along it no longer grows:
-    by the growth distance where the shapes overlap, then by closest points. Returns the axis of
+    by the growth distance where the shapes overlap, then by closest points. Returns the Axis of
     largest separation. ``c``: offset of a's center from b's, m.
     """
     # a bare 0 is a type of its own to numba, for which it would compile all once more
@@ -229,7 +234,9 @@ def refine_axis(a: Shape, b: Shape, c: Vec3, start: Axis) -> Axis:
 
 @compiled
 def max_separation_axis(a: Shape, b: Shape, c: Vec3, cutoff: float) -> Axis:
-    """The axis of largest separation of all, or one with a separation above ``cutoff``, m."""
+    """Find the axis of largest separation of all, or one with a separation above ``cutoff``, m.
+    Returns an Axis. ``c``: from b's center to a's, m.
+    """
     start = face_or_edge_axis(a, b, c, 0.0, cutoff)
     if start[0] <= cutoff and needs_search(a, b):
         return refine_axis(a, b, c, start)

@@ -85,7 +85,9 @@ def half_width(shape: Shape, n: Vec3) -> float:
 
 @compiled
 def core_extent(shape: Shape, n: Vec3) -> float:
-    """Extent, m, of a shape's core along the unit vector n, world: half_width(), or a hull's."""
+    """Extent, m, of a shape's core along the unit vector n, world: half_width(), or a hull's
+    support function. No spheres or triangles.
+    """
     if shape.kind == HULL:
         d = to_local(shape.rotation, n)
         return dot(hull_support(shape.system, shape.hull, d), d)
@@ -142,8 +144,9 @@ def signed_distance(shape: Shape, p: Vec3, u: Vec3) -> tuple[float, Vec3]:
     the frame of the shape: a sphere, capsule, cylinder, box or hull.
 
     It is convex, as the shapes are. At the center of a sphere and on the axis of a capsule or
-    cylinder, the gradient is perpendicular to the axis and to the direction u. Ericson, Real-Time
-    Collision Detection (2005), section 5.1.
+    cylinder, the gradient is perpendicular to the axis and to the direction u; where a cylinder's
+    cap is nearer, it is along the axis. Ericson, Real-Time Collision Detection (2005), section
+    5.1.
     """
     size = shape.size
     if shape.kind == BOX:

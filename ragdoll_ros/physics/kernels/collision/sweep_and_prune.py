@@ -36,7 +36,9 @@ cluster."""
 
 
 def make_dolls(first: np.ndarray, reach: np.ndarray, normal: np.ndarray, offset: float) -> Dolls:
-    """Allocate what find_pairs() needs of a scene."""
+    """Make Dolls for find_pairs(). ``first`` (d + 1,), ``reach`` (n,), m: as in Dolls. ``normal``,
+    ``offset``, m: of the ground; -inf: none.
+    """
     count = len(first) - 1
     return Dolls(first, reach, np.array([*normal, offset], float), np.arange(count),
                  np.zeros(count, DOLL_SPHERE), np.zeros(len(reach)), np.zeros(len(reach)),
@@ -45,7 +47,9 @@ def make_dolls(first: np.ndarray, reach: np.ndarray, normal: np.ndarray, offset:
 
 @compiled
 def set_spheres(dolls: Dolls, states: np.ndarray, clusters: np.ndarray, ahead: float) -> None:
-    """Write the spheres of all dolls and bones for ``ahead`` s."""
+    """Write the spheres of all dolls and bones for ``ahead`` s, except sweep_radius. ``clusters``
+    (d,): of each doll, for ``deflected``.
+    """
     normal, offset = vec(dolls.ground), dolls.ground[3]
     for d in range(len(dolls.spheres)):
         dolls.near_ground[d] = 0
@@ -75,13 +79,14 @@ def set_spheres(dolls: Dolls, states: np.ndarray, clusters: np.ndarray, ahead: f
 
 @compiled
 def set_sweep_radii(spheres: np.ndarray) -> None:
-    """Write sweep_radius, m: of spheres at rest around dolls that overlap wherever those swept
-    along their displacements do. It is radius + |u - w|; ground_radius + |w| if ``deflected``.
+    """Write sweep_radius, m: the radius of a sphere at rest around each doll. Such spheres overlap
+    wherever the dolls' spheres do, swept along their displacements. It is radius + |u - w|;
+    ground_radius + |w| if ``deflected``.
 
-    For displacements u and v, and a common one w: |u - v| <= |u - w| + |v - w|. Any w is
-    right; the mean is used, to which deflected dolls contribute zero. Where speeds count
-    relative to the ground, as one of a pair may be ``deflected``, the other one's sphere may be
-    wider by |u|; but |u| <= |u - w| + |w|, and |w| is added to the deflected one.
+    For displacements u and v, and any common w: |u - v| <= |u - w| + |v - w|. The mean is used as
+    w, to which deflected dolls contribute zero. If one of a pair is ``deflected``, speeds count
+    relative to the ground: the other one's sphere must be wider by |u|. As |u| <= |u - w| + |w|,
+    |w| is added to the radius of the deflected one.
     """
     total = (0.0, 0.0, 0.0)
     for d in range(len(spheres)):
@@ -115,7 +120,9 @@ def distance(a: Vec3, b: Vec3) -> float:
 
 @compiled
 def may_touch(dolls: Dolls, states: np.ndarray, a: int, b: int) -> bool:
-    """Whether the spheres of two dolls, and then those of two of their bones, meet."""
+    """Whether the swept spheres of two dolls, and then those of two of their bones, meet. After
+    set_spheres() and set_sweep_radii().
+    """
     one, other = dolls.spheres[a], dolls.spheres[b]
     center = vec(one.center)
     apart = distance(center, vec(other.center))
@@ -153,8 +160,8 @@ def find_pairs(dolls: Dolls, states: np.ndarray, moving: np.ndarray, yielding: n
     cluster are found as well. A pair needs one that moves and one that yields, which may be the
     same. Dolls are swept for IMPACT_SPEEDUP times ``ahead``, as impacts may make them faster; what
     overlaps is tested by may_touch(). Writes the pairs, lower index first, to ``pairs`` (k, 2).
-    Returns the number found; if it exceeds k, the others are not written. Overwrites dolls.spheres
-    and dolls.order.
+    Returns the number found; if it exceeds k, the others are not written. Overwrites dolls.order
+    and the scratch of ``dolls``.
     """
     set_spheres(dolls, states, clusters, IMPACT_SPEEDUP * ahead)
     spheres, order, count, widest = dolls.spheres, dolls.order, 0, 0.0

@@ -50,7 +50,9 @@ def digest(folder: Path) -> str:
 
 
 def _machine() -> str:
-    """Digest, 8 hex digits, of what else the code depends on: versions and the processor."""
+    """Digest, 8 hex digits, of what machine code depends on beside the kernels: the Python ABI, the
+    versions of numba and NumPy, and the processor.
+    """
     processor = registry.cpu_target.target_context.codegen().magic_tuple()
     known = sysconfig.get_config_var('SOABI'), numba.__version__, np.__version__, processor
     return hashlib.sha256(repr(known).encode()).hexdigest()[:8]
@@ -140,13 +142,14 @@ class KernelCache(caching._Cache):
 
 
 def machine_code(kept: tuple) -> bytes:
-    """What numba keeps of a compiled function, as it is loaded fastest.
+    """Serialize ``kept``, what numba keeps of a compiled function, to the content of a cache file
+    that loads fast.
 
-    Two things take numba most of the time. It reads the LLVM IR, which compiled callers link in,
-    for the names that it defines: here it reads IR of the one name that it looks up, and the whole
-    only for a caller. It imports the module of each function that was linked in, SciPy for one,
-    with that function's environment: here those without constants, which nothing reads, are left
-    out.
+    Two things take most of numba's time to load. It parses the LLVM IR for the names that it
+    defines, though only compiled callers link it in: the file has a short IR that defines the one
+    name that numba looks up, and the whole IR apart, for callers. It imports the module of each
+    function that was linked in, SciPy for one, with that function's environment: environments
+    without constants, which nothing reads, are left out.
     """
     (name, kind, (code, called_code)), described, *rest, environments = kept
     entry = binding.parse_assembly(
@@ -178,9 +181,10 @@ def keep(dispatcher: Dispatcher) -> None:
 
 @contextlib.contextmanager
 def compile_lock(group: str) -> Iterator[None]:
-    """Hold the lock of a ``group`` of kernels, so that one process at a time compiles it; those
-    that waited load what it saved. There is none where files cannot be locked. Garbage collection
-    is off within, which saves a seventh of the time. Ctrl-C prints notices.INTERRUPTED.
+    """Hold the lock of a ``group`` of kernels: one process at a time compiles it, and those that
+    wait load what it saved. Where files cannot be locked, go on without a lock. Garbage collection
+    is off within, which saves a seventh of the time. Ctrl-C raises KeyboardInterrupt as usual,
+    after printing notices.INTERRUPTED if this process has begun to compile kernels.
     """
     with contextlib.ExitStack() as stack:
         if gc.isenabled():

@@ -12,7 +12,9 @@ def cycles_now() -> int:
 
 
 def cycle_rate(seconds: float = 0.05) -> float:
-    """Cycles a second, measured over so many; 0 where they are not counted."""
+    """Measure the cycles per second of cycles() by busy waiting for ``seconds`` s; 0 where cycles
+    are not counted.
+    """
     if not COUNTED:
         return 0.0
     start, first = time.perf_counter(), cycles_now()

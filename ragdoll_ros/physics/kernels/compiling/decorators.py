@@ -36,17 +36,20 @@ else:
 
 
 def type_like(value: object) -> object:
-    """Numba's type of a number, an array, or a named tuple of arrays; None without numba."""
+    """Return numba's type of a number, an array, or a named tuple of arrays; None where kernels are
+    not compiled.
+    """
     return numba.typeof(value) if ready() else None
 
 
 def entry(*types: object) -> Callable[[Callable], Callable]:
-    """Compile a function that Python calls, when it is defined, for exactly these types of its
-    arguments: others raise TypeError. It releases the GIL, and divides by zero without an
-    exception. Where kernels are not compiled the function is returned as it is.
+    """Return a decorator that compiles a function for calls from Python as soon as it is defined,
+    for arguments of these ``types``: other numbers are converted, anything else raises TypeError.
+    The compiled function releases the GIL and divides by zero without an exception. Where kernels
+    are not compiled, the decorator returns the function unchanged.
 
-    The code is kept for the next process, under the function's name, so the function must be at the
-    top level of a module.
+    The code is cached on disk under the function's name, so the function must be at the top level
+    of a module.
     """
     def compile_at_once(function: Callable) -> Callable:
         if not ready():
@@ -60,6 +63,8 @@ def entry(*types: object) -> Callable[[Callable], Callable]:
 
 
 def rows_of(dtype: np.dtype, count: int) -> np.ndarray:
-    """Zeroed records (count,), whose fields Python code too reads by their names."""
+    """Allocate ``count`` zeroed records. Where kernels are not compiled, as a recarray: there they
+    run as Python, and read fields as attributes.
+    """
     rows = np.zeros(count, dtype)
     return rows if ready() else rows.view(np.recarray)

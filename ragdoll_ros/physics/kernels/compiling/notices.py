@@ -15,7 +15,7 @@ WAITING = 'Another process compiles the dynamics: waiting for it'
 
 
 def say(words: str) -> None:
-    """Print a message."""
+    """Print a message to standard error."""
     print(words, file=sys.stderr, flush=True)
 
 

@@ -35,10 +35,15 @@ SAME_DIRECTION = 1e-3
 @compiled
 def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps: np.ndarray,
                   h: float) -> int:
-    """Write to contacts.found the contacts at q, the middle of a step of h s, which touch by
-    ``gaps``; h = 0: those at an instant. Of a pair they are the points whose own gap touches, or
-    where they have none, those nearer than what closes slowly in h s, or than the pair has closed
-    since ws.gaps, if that is more. Returns their number. ``kin``: of q, with its geoms.
+    """Find the contacts at q, the middle of a step of h s (h = 0: at an instant), and write them to
+    contacts.found. Returns their number; contacts for which there is no room are dropped. ``kin``:
+    of q, with its geoms.
+
+    Ground points, points on planes, joint limits and pairs of other shapes are in contact if their
+    gap in ``gaps`` is at most scalars.touching. Such a pair contributes points of its manifold. In
+    a step, if its points are tracked: those that is_contact_of_step() accepts. Else: those with a
+    gap of at most SLOW h (at an instant: scalars.touching) or, if that is more, of what the pair
+    has closed since ws.gaps.
     """
     m, n, contacts, touching = 0, 0, ws.contacts.found, ws.step.scalars[0].touching
     for k in range(len(s.geoms)):
@@ -75,8 +80,9 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
 def write_ground_contact(s: System, kin: Kinematics, k: int, point: int, normal: Vec3,
                          offset: float, law: np.record, c: np.record) -> None:
     """Write to ``c`` the contact of geom k's ``point``, see gaps.ground_point(), with the ground or
-    a plane of this ``normal`` and ``offset``, but for id, patch and what set_friction_points()
-    writes; ``law``: the geom or the pair, whose friction and restitution count.
+    a plane of this ``normal`` and ``offset``, m: kind, bodies, point, normal, gap, friction and
+    restitution. The caller writes id and patch. ``law``: the geom or the pair from which friction
+    and restitution are taken.
     """
     geom = s.geoms[k]
     c.kind = ROLLING if law.rolling_friction > 0 else FRICTIONAL
@@ -103,8 +109,10 @@ def write_limit(s: System, q: np.ndarray, k: int, side: int, id_: int, c: np.rec
 @compiled
 def add_pair_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int, m: int,
                       margin: float, h: float) -> int:
-    """Append the points of pair k to m contacts in contacts.found, those without gaps of their own
-    if nearer than ``margin`` m: see find_contacts(). Returns their number then.
+    """Append the contact points of pair k to the m contacts in contacts.found. Returns the new
+    number. In a step (h > 0) of a pair with tracked points: those that is_contact_of_step()
+    accepts. Else: points with a gap of at most ``margin``, m. Friction of MOVED bodies is at most
+    KINEMATIC_FRICTION.
     """
     pair, contacts, manifold, begin = s.pairs[k], ws.contacts, ws.contacts.manifold, 0
     a, b, first_id = s.geoms[pair.a], s.geoms[pair.b], ws.gap_counts[0].fixed + IDS_PER_PAIR * k
@@ -139,9 +147,10 @@ def add_pair_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
 
 @compiled
 def id_on_plane(s: System, a: int, n: Vec3, vertex: int) -> int:
-    """Id of the contact of a vertex of geom ``a`` with a face of normal n, which is rounded: the
-    same on all faces of this normal, so that what slides from one triangle to the next persists. It
-    is below 0, as no other is.
+    """Return the id of the contact of a vertex of geom ``a`` with a triangle's face of unit normal
+    n. It depends on n's x and y, rounded to SAME_DIRECTION, and the sign of its z, but not on the
+    triangle, so that a contact that slides from one triangle to the next persists. No other ids are
+    negative.
     """
     x, y = round(n[0] / SAME_DIRECTION), round(n[1] / SAME_DIRECTION)
     size = round(2 / SAME_DIRECTION) + 1
@@ -151,9 +160,9 @@ def id_on_plane(s: System, a: int, n: Vec3, vertex: int) -> int:
 
 @compiled
 def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) -> None:
-    """Write tangents, friction points and patch shares of m contacts, limits excepted, to
-    contacts.found. Those of a patch must be adjacent; friction acts nearer to its center than the
-    normal forces.
+    """Write the tangents, friction points and patch shares (1) of the first m contacts in
+    contacts.found, except joint limits. Contacts of one patch must be adjacent. Their friction
+    points are nearer to the center of the patch than their points, where the normal forces act.
 
     Under a uniform pressure p, friction against turning about the center has the moment mu times
     the integral of p times the distance: its lever arm is the mean distance over the patch, not
@@ -199,7 +208,9 @@ def cylinder_of_patch(s: System, patch: int) -> int:
 
 @compiled
 def patch_end(contacts: np.ndarray, begin: int, m: int) -> int:
-    """Index of the first of m contacts after ``begin`` that is not of the same patch."""
+    """Index after the last contact of the patch that starts at ``begin``, among m contacts. A joint
+    limit, which has patch -1, counts as a patch of its own.
+    """
     patch, end = contacts[begin].patch, begin + 1
     while end < m and contacts[end].patch == patch and patch >= 0:
         end += 1
@@ -208,7 +219,9 @@ def patch_end(contacts: np.ndarray, begin: int, m: int) -> int:
 
 @compiled
 def face_center(geom: np.record, k: int, kin: Kinematics, c: np.record) -> Vec3:
-    """Center, m, of the face of cylinder k that has contact c with a plane."""
+    """Center, m, world, of the end face of cylinder k that faces against the normal of c, the
+    cylinder's contact with a plane.
+    """
     axis = column(kin.geom_rotations[k], 2)
     low = -geom.size[1] if dot(axis, vec(c.normal)) > 0 else geom.size[1]
     return add_scaled(vec(kin.geom_positions[k]), low, axis)
@@ -217,8 +230,9 @@ def face_center(geom: np.record, k: int, kin: Kinematics, c: np.record) -> Vec3:
 @compiled
 def contract_to_disc(geom: np.record, k: int, kin: Kinematics, contacts: np.ndarray, begin: int,
                      end: int) -> None:
-    """Write friction points of contacts begin to end - 1, the face of cylinder k on a plane: at
-    two thirds of the radius, the mean distance of a disc's points from its center.
+    """Write the friction points of contacts begin to end - 1, which are on the rim of an end face
+    of cylinder k on a plane: at two thirds of the radius, the mean distance of a disc's points from
+    its center.
     """
     center = face_center(geom, k, kin, contacts[begin])
     for e in range(begin, end):
@@ -257,10 +271,11 @@ def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
 
 @compiled
 def had_met(s: System, contacts: np.ndarray, count: int, id_: int) -> bool:
-    """Whether the contact with this id was one of the ``count`` of the last step, and had a gap of
-    at most MET or any contact of the same two dolls had a normal impulse; of one doll, any contact
-    with the ground or at its limits. Its own impulse is not asked for: of redundant contacts
-    rounding decides which have one.
+    """Whether the contact with this id took part in the last step, whose contacts are the first
+    ``count`` of ``contacts``: it is among them, and either its gap was at most MET, or a contact
+    between the same two dolls had a normal impulse; of a contact with the WORLD, one of the same
+    doll with the ground, a static geom or a joint limit. An impulse of its own is not required: of
+    redundant contacts rounding decides which have one.
     """
     j = find_id(contacts, count, id_, 0)
     if j == count or contacts[j].gap <= MET:

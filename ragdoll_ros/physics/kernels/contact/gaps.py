@@ -74,11 +74,13 @@ def update_kinematics_and_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.
 def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before: np.ndarray,
                 h: float, out: np.ndarray) -> None:
     """Write all gaps at q to ``out`` (k,) and place the geoms in ``kin``, which is that of q and of
-    the current velocities. ``before``: the gaps h s earlier, from which pairs are known to be far
-    still (h infinite: unknown); may be ``out``. Pairs in ws.excluded, those of kinematic or
-    static bodies alone, and points and limits of kinematic bodies get EXCLUDED; without ground its
-    gaps are not written. In a step the gaps of pairs whose points have their own are left to
-    update_point_gaps(). Reads contacts.motion[].correction, writes its speeds.
+    the current velocities. ``before``: the gaps h s earlier (h infinite: unknown); may be ``out``.
+    A pair that must still be farther apart than NEAR gets a lower bound without a narrow phase.
+
+    EXCLUDED is written for pairs in ws.excluded, for pairs of a kinematic body with another one or
+    with a static geom, and for ground points and joint limits of kinematic bodies. Not written are
+    other gaps from the ground if there is none, and in a step those of pairs with tracked points:
+    see update_point_gaps(). Reads the corrections in contacts.motion, writes its speeds.
     """
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     n, narrow_phases = 0, 0
@@ -139,8 +141,9 @@ def clear_corrections(motion: np.ndarray) -> None:
 @compiled
 def label_reachable(s: System, ws: Workspace, kin: Kinematics, gaps: np.ndarray, h: float,
                     label: np.ndarray) -> None:
-    """Write to ``label`` (d,) which dolls may meet within h s, directly or by others: the least
-    index of all that may. Speeds count MOST_SPEEDUP times. ``kin``, ``gaps``: current.
+    """Group the dolls that may meet within h s, directly or through others: write the least index
+    of its group to ``label`` (d,) of each doll. Speeds are multiplied by MOST_SPEEDUP. ``kin``,
+    ``gaps``: current. Overwrites contacts.motion.
     """
     motion = ws.contacts.motion
     clear_corrections(motion)
@@ -186,9 +189,11 @@ def plane_of(kin: Kinematics, k: int) -> tuple[Vec3, float]:
 @compiled
 def ground_gaps(s: System, geom: np.record, position: np.ndarray, r: np.ndarray, normal: Vec3,
                 offset: float, first: int, out: np.ndarray) -> None:
-    """Write the heights, m, of a geom's ground points to ``out`` from ``first`` on, in the order of
-    ground_point(). ``position``, ``r``: the geom's pose; ``normal``, ``offset``: of the ground or a
-    plane.
+    """Write the gaps, m, of a geom's ground points from a plane to ``out`` from ``first`` on, in
+    the order of ground_point(). ``position``, ``r``: the geom's pose; ``normal``, ``offset``: of
+    the ground or a plane. If the bounding sphere is farther than FAR, all get its gap. Of a
+    cylinder whose end faces are tilted by a sine of 0.1 or more, rim points but the lowest get the
+    height of their end's center, or FAR if that is more.
     """
     high = dot(vec(position), normal) - offset
     if high > geom.bounding_radius + FAR:
@@ -229,10 +234,10 @@ def ground_gaps(s: System, geom: np.record, position: np.ndarray, r: np.ndarray,
 @compiled
 def ground_point(s: System, geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
                  normal: Vec3) -> Vec3:
-    """Point k of a geom that may touch a plane of this unit ``normal``, m, world.
+    """Point k of those of a geom that may touch a plane of this unit ``normal``, m, world.
 
-    Sphere: the lowest. Capsule: the lowest of end k, 0 at -z. Box, hull: corner k. Cylinder,
-    k = 5 end + i: i = 0 is the lowest of that end's rim, 1 to 4 are those at +x, -x, -y, +y.
+    Sphere: the lowest. Capsule: the lowest of end k, 0 at -z. Box, hull: corner k. Cylinder, k = 5
+    end + i, end 0 at -z: i = 0 is the lowest of that end's rim, 1 to 4 are those at +x, -x, +y, -y.
     ``position``, m, and r (3, 3): the geom's pose in the world.
     """
     size = geom.size
@@ -265,9 +270,11 @@ def ground_point(s: System, geom: np.record, k: int, position: np.ndarray, r: np
 @compiled
 def enable_separated_pairs(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
                            v: np.ndarray) -> bool:
-    """Clear flags of ws.excluded whose reason is gone: geoms that overlapped have separated, or
-    joints between them are within their limits again. Returns whether a pair may collide from now
-    on, whose gap is not known yet. ``kin`` becomes that of q and v.
+    """Clear the flags of ws.excluded whose reason is gone: OVERLAPPING of pairs that penetrate by
+    less than STILL_OVERLAPPING, JOINT_OUTSIDE_LIMITS where the joints between the bodies are within
+    their limits again, to 2 BEYOND_LIMIT. Returns whether a pair has lost its last flag, so that it
+    may collide: its gap is not known yet. ``kin`` becomes that of q and v, but stays as it is if no
+    pair is excluded.
     """
     excluded, some = ws.excluded, False
     for k in range(len(excluded)):
@@ -338,8 +345,8 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
 
 @compiled
 def without_internal_edges(s: System, ws: Workspace, kin: Kinematics, k: int, gap: float) -> float:
-    """Gap of pair k, m: ``gap``, or NEAR, as if it were apart, if it is less than FLUSH and a ghost
-    collision at an internal edge. Overwrites contacts.edge_manifold.
+    """Gap of pair k, m: NEAR, as if the pair were apart, if ``gap`` is less than FLUSH and belongs
+    to a ghost collision at an internal edge; else ``gap``. Overwrites contacts.edge_manifold.
     """
     if gap < FLUSH and is_at_internal_edge(s, kin, k, ws.contacts.edge_manifold):
         return NEAR

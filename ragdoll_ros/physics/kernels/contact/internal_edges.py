@@ -29,9 +29,9 @@ SAME_NORMAL = 1 - 1e-10
 def is_at_internal_edge(s: System, kin: Kinematics, k: int, manifold: np.ndarray) -> bool:
     """Whether pair k is a ghost collision at an internal edge of its static box.
 
-    It is if all its points nearer than FLUSH lie on a face that is coplanar with one of another
-    static box on which the same geom rests, and none has that face's normal. Overwrites
-    ``manifold``.
+    It is if the same geom rests on a face of another static box that is coplanar with a face of
+    this one, all its points on this box that are nearer than FLUSH lie on that face, and none of
+    them has the normal of that face. Overwrites ``manifold``.
     """
     pair = s.pairs[k]
     if s.geoms[pair.b].body != WORLD or s.geoms[pair.b].kind != BOX:
@@ -73,8 +73,8 @@ def _is_flush(box: Shape, other: Shape, normal: Vec3) -> bool:
 
 @compiled
 def _touches_edge(a: Shape, box: Shape, other: Shape, normal: Vec3, manifold: np.ndarray) -> bool:
-    """Whether all contacts with ``box`` lie on the face of ``other`` with this normal, but have
-    another normal.
+    """Whether ``a`` has contacts with ``box``, nearer than FLUSH, and all of them lie on the face
+    of ``other`` with this normal, but have another normal. Overwrites ``manifold``.
     """
     found = collide(a, box, FLUSH, manifold)
     for j in range(found):
@@ -92,6 +92,8 @@ def _touches_edge(a: Shape, box: Shape, other: Shape, normal: Vec3, manifold: np
 
 @compiled
 def _touches_face(a: Shape, other: Shape, normal: Vec3, manifold: np.ndarray) -> bool:
-    """Whether ``a`` is on the face of ``other`` with this normal."""
+    """Whether ``a`` is within FLUSH of the face of ``other`` with this normal. Overwrites
+    ``manifold``.
+    """
     return collide(a, other, FLUSH, manifold) > 0 and dot(
         vec(manifold[0].normal), normal) > SAME_NORMAL

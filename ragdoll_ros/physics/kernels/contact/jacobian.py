@@ -15,9 +15,11 @@ from ..workspace import Island
 @compiled
 def contact_jacobian(s: System, kin: Kinematics, q: np.ndarray, island: Island, c: np.record,
                      index: int, v: np.ndarray, v_free: np.ndarray) -> None:
-    """Write the Jacobian of contact c, found[index], to island.Y from row c.first_row on, the
-    degrees of freedom of its columns, descending, to island.support[index], their number to
-    c.dof_count; the velocities under ``v_free`` to island.rhs, under v to island.start_velocity.
+    """Write the Jacobian J of contact c, found[index], to island.Y from row c.first_row on. Its
+    columns are those of the last degrees of freedom of the bodies, or that of the limit, and of all
+    their parents: written, descending, to island.support[index], their number to c.dof_count. Of a
+    limit all but the first are 0. Writes J v_free to island.rhs and J v to
+    island.start_velocity.
     """
     row, Y, support = c.first_row, island.Y, island.support[index]
     b, was = island.rhs, island.start_velocity
@@ -62,8 +64,10 @@ def root_of(s: System, q: np.ndarray, body: int) -> Vec3:
 @compiled
 def add_jacobian_column(axis: np.ndarray, root: Vec3, c: np.record, sign: float, Y: np.ndarray,
                         j: int) -> None:
-    """Add to column j of a contact's rows in Y, times ``sign``, their velocities per unit rate of
-    the degree of freedom with motion subspace ``axis`` about ``root``, m.
+    """Add one degree of freedom, times ``sign``, to column j of a contact's rows in Y: the velocity
+    along each row per unit rate. Rows: normal at c.point, two tangents at c.friction_point, of
+    ROLLING contacts also the rotation about both tangents. ``axis`` (6,): motion subspace about
+    ``root``, m, world.
     """
     row, turn = c.first_row, vec(axis)
     n, t, w = vec(c.normal), vec(c.tangents[0]), vec(c.tangents[1])
@@ -100,9 +104,10 @@ def apply_inverse_factor(dof_parent: np.ndarray, L: np.ndarray, island: Island, 
 @compiled
 def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                        c: np.record) -> None:
-    """Write the velocities along a contact's rows, of body a relative to b, to c.start_velocity:
-    normal at c.point, tangential at c.friction_point, then rolling; that about the normal to
-    c.spin. Of a joint limit only the first. ``kin``: of q and v.
+    """Write the velocities of body a relative to b along a contact's rows to c.start_velocity:
+    normal at c.point, tangential at c.friction_point, m/s, then rolling, rad/s; and the one about
+    the normal, rad/s, to c.spin. Of a joint limit only the first entry is written, the joint's rate
+    in the direction c.limit_sign, rad/s; its spin is 0. ``kin``: of q and v.
     """
     start = c.start_velocity
     c.spin = 0.0
@@ -127,7 +132,9 @@ def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
 @compiled
 def normal_velocity(s: System, kin: Kinematics, q: np.ndarray, body: int, point: Vec3,
                     normal: Vec3) -> float:
-    """Velocity, m/s, along ``normal`` of a body's point that is at ``point``, m, world."""
+    """Velocity, m/s, along ``normal`` of the point of a body that is at ``point``, m, world; 0 of
+    the WORLD.
+    """
     if body == WORLD:
         return 0.0
     return dot(normal, velocity_at(kin, body, sub(point, root_of(s, q, body))))

@@ -19,8 +19,10 @@ DEGENERATE = 1e-3
 
 @compiled
 def contract_friction_points(contacts: Contacts, begin: int, end: int) -> None:
-    """Move the friction points of contacts begin to end - 1, a patch, towards its center, by the
-    mean distance of its area over that of its corners.
+    """Write the friction points of contacts begin to end - 1, a patch. Each is the contact's point,
+    moved towards the mean of all points: its distance is multiplied by (mean distance of the
+    patch's area from the mean) / (mean distance of the corners from it), at most 1; SEGMENT_MEAN
+    for a segment. Overwrites contacts.angles, u and v.
     """
     found, count = contacts.found, end - begin
     center = 0.0, 0.0, 0.0
@@ -71,8 +73,9 @@ def pseudo_angle(x: float, y: float) -> float:
 
 @compiled
 def triangle_moment(ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
-    """Area of the triangle of the origin, a and b, and the integral over it of the distance from
-    the origin: d^3/6 (sec tan + ln(sec + tan)) between a and b, d the height of the side ab.
+    """Area, m^2, of the triangle of the origin, a and b, and the integral over it of the distance
+    from the origin, m^3: d^3/6 (sec tan + ln(sec + tan)) between a and b, d the height of the side
+    ab. Both are 0 unless the corners are counterclockwise.
     """
     area = (ax * by - ay * bx) / 2
     side = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)

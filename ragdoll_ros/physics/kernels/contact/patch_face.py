@@ -32,8 +32,10 @@ its center over that of its corners. Corners, from the center: in contacts.u and
 @compiled
 def measure_face(s: System, contacts: Contacts, kin: Kinematics, begin: int, end: int,
                  middle: Vec3) -> tuple[Vec3, Face]:
-    """Centroid of the area, m, world, and Face of the patch of the contacts begin to end - 1, whose
-    points have the mean ``middle``, m. Overwrites contacts.u and v: corners from the centroid, m.
+    """Return the center, m, world, and the Face of the patch of contacts begin to end - 1: a disc,
+    a polygon, or a segment if its area is close to 0. ``middle``: mean of their points, m. The
+    center is the centroid. Except of a disc, writes the corners from the centroid, m, to contacts.u
+    and v.
     """
     found, count, u, v = contacts.found, end - begin, contacts.u, contacts.v
     first = found[begin]
@@ -69,10 +71,10 @@ def measure_face(s: System, contacts: Contacts, kin: Kinematics, begin: int, end
 @compiled
 def measure_segment(c: np.record, count: int, middle: Vec3, u: np.ndarray,
                     v: np.ndarray) -> tuple[Vec3, Face]:
-    """Center, m, world, and Face of a patch whose ``count`` points are on a line: the segment that
-    they span, as its half and the pseudo-inverse of its second moments, 1/m^2. ``u``, ``v``:
-    coordinates of the points along c.tangents, from ``middle``, m; the first two become the ends of
-    the segment, from its center.
+    """Return the center, m, world, and the Face of a patch whose ``count`` points are on a line:
+    half the vector of the segment that they span, and the pseudo-inverse of its second moments,
+    1/m^2. ``u``, ``v``: coordinates of the points along c.tangents from ``middle``, m; their first
+    two entries become the ends of the segment, from its center.
     """
     far = 0
     for k in range(count):
@@ -97,9 +99,9 @@ def pressed_part(contacts: Contacts, count: int, face: Face, px: float,
                  py: float) -> tuple[float, float, float]:
     """Part of the face that carries a pressure with the center (px, py), m, without tension.
 
-    The part is a scaled copy of the face, over which an affine pressure with that center is
-    nowhere negative. Returns its scale, 0 to 1, and its centroid, m: 1 and (0, 0) is the whole
-    face.
+    The part is a scaled copy of the face, over which an affine pressure with that center is nowhere
+    negative, unless its scale would be below SMALLEST. Returns its scale, SMALLEST to 1, and its
+    centroid; 1 and (0, 0) for the whole face. Centers and centroid: m, from the face's center.
     """
     u, v = contacts.u, contacts.v
     if face[0] == DISC:
@@ -125,7 +127,9 @@ def pressed_part(contacts: Contacts, count: int, face: Face, px: float,
 
 @compiled
 def face_moments(contacts: Contacts, count: int, face: Face, x: float, y: float) -> Moments:
-    """Moments of a face about the center (x, y)."""
+    """Return the Moments of a face, see slip_integrals.moments(). (x, y): center of rotation, m,
+    from the face's center. A polygon's ``count`` corners: contacts.u and v.
+    """
     if face[0] == DISC:
         return disc_moments(face[1], x, y)
     if face[0] == SEGMENT:
@@ -136,12 +140,13 @@ def face_moments(contacts: Contacts, count: int, face: Face, x: float, y: float)
 @compiled
 def resultant_and_moment(face: Face, moments: Moments, px: float,
                          py: float) -> tuple[float, float, float]:
-    """Means over a face of y/|y|, two numbers, and of |y|, m, weighted by an affine pressure; y:
-    position relative to the center of rotation, about which ``moments`` are.
+    """Return the means over a face, weighted by an affine pressure, of y/|y|, two numbers, and of
+    |y|, m, where y is the position relative to the center of rotation, about which ``moments`` are.
+    (px, py): center of pressure relative to that of the face, m.
 
-    (px, py): center of pressure relative to that of the face, m. Times friction coefficient and
-    normal force, the first, turned by 90 degrees against the rotation, is the friction force of a
-    turning patch; the second is its moment about the center of rotation.
+    Times friction coefficient and normal force, the first mean, turned by 90 degrees against the
+    rotation, is the friction force of a turning patch; the second is its moment about the center of
+    rotation.
     """
     gx, gy = face[3] * px + face[4] * py, face[4] * px + face[5] * py
     return (moments[0] + gx * moments[2] + gy * moments[4],

@@ -55,12 +55,13 @@ LONGEST = 4.0
 @compiled
 def set_slip_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, m: int,
                       h: float) -> bool:
-    """Set friction points and shares of all flat patches among m found contacts whose friction has
-    a limit, by set_patch_friction(), from their impulses: at first those of warm_start().
+    """Set friction points and shares of the flat patches with limited friction among m found
+    contacts, by set_patch_friction(), from the latest impulses: before the first solve those of
+    warm_start(). Patches of one contact are left out.
 
     ``kin``: of q, whose velocities give the slip. ``h``: length of the step, s; 0: an impact.
-    start_velocity becomes that of the new points. Returns whether any has changed by more than
-    MOVED: then solve again.
+    start_velocity becomes that at the new points. Returns whether any point or share has changed by
+    more than MOVED: then solve again.
     """
     found, begin, changed = ws.contacts.found, 0, False
     while begin < m:
@@ -75,8 +76,9 @@ def set_slip_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, 
 
 @compiled
 def reference_contact(contacts: np.ndarray, begin: int, end: int, in_step: bool) -> int:
-    """Index of a contact of a flat patch whose friction has a limit; with ``in_step`` preferably a
-    persistent one. -1 if there is none, or if the patch is not flat.
+    """Index of a contact of a flat patch with limited friction: a coefficient above 0 and below
+    NO_SLIP. With ``in_step`` preferably a persistent one. -1 if there is none, or if the patch is
+    not flat.
     """
     reference = -1
     for e in range(begin, end):
@@ -109,14 +111,15 @@ def slip_at(s: System, kin: Kinematics, q: np.ndarray, c: np.record,
 @compiled
 def set_patch_friction(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, begin: int,
                       end: int, reference: int, h: float) -> bool:
-    """Set the friction points and patch_share, a factor of the friction coefficient, of contacts
-    begin to end - 1, a flat patch, from their normal impulses and its slip at q.
+    """Set the friction points and patch_share, a factor on the friction coefficient, of contacts
+    begin to end - 1, a flat patch, from their normal impulses and the patch's slip at q.
 
     ``reference``: index of the contact whose tangents are the axes of the slip. ``h``: length of
-    the step, s; 0: an impact. A patch that turns steadily gets points and shares by its
-    instantaneous center of rotation; else shares stay, and the points are shifted so that their
-    mean, weighted by normal impulse, is the center of pressure. Returns whether any has changed by
-    more than MOVED. A patch that slips slower than STILL sticks: it is left unchanged.
+    the step, s; 0: an impact. A patch that slips slower than STILL sticks: it is left unchanged. A
+    patch that turns, in an impact or steadily, see is_steady(), gets points and shares by its
+    instantaneous center of rotation, see turn_about(). Any other, or one whose pressed part is
+    POINTLIKE, keeps its shares; if it has normal impulses, its points are shifted so that their
+    mean, weighted by these, is the center of pressure. Returns whether one changed beyond MOVED.
     """
     found, total, count = ws.contacts.found, 0.0, end - begin
     middle = pressed = mean = (0.0, 0.0, 0.0)
@@ -173,11 +176,14 @@ def is_steady(c: np.record, at: Vec3, slip: tuple[float, float, float], size: fl
 def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Face,
                part: tuple[float, float, float], pressed: tuple[float, float],
                about: tuple[float, float]) -> bool:
-    """Set friction points and shares of a patch that turns about a point ``about``, given from its
-    center, as the center of pressure ``pressed``; ``part``: scale and center x, y of the pressed
-    part of its face. All points are put on one line through ``about``, spread along it; where the
-    resultant is not above WEAK, each gets a direction and share of its own, or stays where that has
-    no strength. Returns whether any has changed by more than MOVED.
+    """Set friction points and shares of contacts begin to end - 1, a patch that turns about a
+    point. ``about``, this point, and ``pressed``, the center of pressure: from ``center`` along the
+    tangents, m. ``part``: the pressed part of its ``face``, see pressed_part().
+
+    If the resultant of the patch's friction, over mu times its normal force, is above WEAK, all
+    points are put on one line through ``about``, spread along it, with one share. Else each gets a
+    direction and share of its own, or stays if its own resultant is 0. Returns whether a point or
+    share has changed by more than MOVED.
     """
     found, size, changed = contacts.found, 0.0, False
     t, w = vec(found[begin].tangents[0]), vec(found[begin].tangents[1])
@@ -213,9 +219,9 @@ def turn_about(contacts: Contacts, begin: int, end: int, center: Vec3, face: Fac
 
 @compiled
 def set_friction(c: np.record, at: Vec3, share: float, size: float) -> bool:
-    """Move the friction of contact c, of a patch of this ``size``, m, to the point ``at``, with its
-    velocity at the step's start, and set its share. Returns whether that is a change by more than
-    MOVED.
+    """Set the friction point of contact c to ``at``, m, and its patch share to ``share``; shift the
+    tangential start_velocity to the new point. Returns whether the point, over the patch's
+    ``size``, m, or the share has changed by more than MOVED.
     """
     moved, before = sub(at, vec(c.friction_point)), c.patch_share
     c.start_velocity[1] -= c.spin * dot(vec(c.tangents[1]), moved)

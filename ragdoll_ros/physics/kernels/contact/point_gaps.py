@@ -24,8 +24,9 @@ from .placed_shape import placed_shape
 
 @compiled
 def track_points(s: System, ws: Workspace, kin: Kinematics) -> None:
-    """Give gaps to the points of all pairs that touch by ws.gaps, as a step begins: write them to
-    contacts.points, and their gaps to ws.gaps. ``kin``: of the start, with its geoms.
+    """Begin to track the points of pairs that touch by ws.gaps, as a step begins: write them to
+    contacts.points and their gaps to ws.gaps, and set scalars.tracks_points. Pairs with planes, and
+    those for which there is no room, are left out. ``kin``: of the start, with its geoms.
     """
     counts, contacts, count = ws.gap_counts[0], ws.contacts, 0
     touching = ws.step.scalars[0].touching
@@ -84,8 +85,10 @@ def find_point(ws: Workspace, k: int, feature_id: int) -> int:
 
 @compiled
 def add_point(s: System, ws: Workspace, kin: Kinematics, k: int, at: np.record, h: float) -> int:
-    """Give a point of pair k, ``at`` the end of a trial of h s, a gap. Returns its index in
-    contacts.points, NONE if there is no room. ``kin``: of the end, with its geoms.
+    """Begin to track ``at``, a point of pair k's manifold at the end of a trial of h s: write its
+    gap at the step's start, by moved_gap(), and at the ends of the bracket: interpolated at the low
+    end, EXCLUDED at the high end. Returns its index in contacts.points, NONE if there is no room.
+    ``kin``: of the end, with its geoms.
     """
     counts, contacts = ws.gap_counts[0], ws.contacts
     i, j = counts.live - counts.fixed, counts.live
@@ -101,8 +104,8 @@ def add_point(s: System, ws: Workspace, kin: Kinematics, k: int, at: np.record, 
 
 @compiled
 def moved_gap(s: System, kin: Kinematics, to: Kinematics, k: int, at: np.record) -> float:
-    """Gap, m, in ``to`` between the points of both geoms of pair k that are ``at`` a point of its
-    manifold in ``kin``. Both have their geoms.
+    """Gap, m, in ``to`` between the points fixed to both geoms of pair k that are in ``kin`` at the
+    point ``at`` of its manifold, along its normal, fixed to geom b. ``kin``, ``to``: with geoms.
     """
     a, b = s.pairs[k].a, s.pairs[k].b
     r, r_to = kin.geom_rotations[b], to.geom_rotations[b]
@@ -116,8 +119,8 @@ def moved_gap(s: System, kin: Kinematics, to: Kinematics, k: int, at: np.record)
 
 @compiled
 def middle_gap(s: System, ws: Workspace, j: int) -> float:
-    """Gap j at the middle of the trial just made; of a point of a pair that between the points of
-    both bodies that are there at the step's start, or, if it was added then, at the trial's end.
+    """Gap j at the middle of the trial just made, by one_gap(). Of a point of a pair by
+    moved_gap(): from step.start if it was tracked when the step began, else from step.end.
     """
     i = j - ws.gap_counts[0].fixed
     if i < 0:
@@ -137,12 +140,12 @@ def approach_speed(s: System, kin: Kinematics, q: np.ndarray, k: int, at: np.rec
 @compiled
 def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, h: float,
                       out: np.ndarray) -> None:
-    """Write the gaps of pairs that touched as the step began, and of their points, at the end of a
-    trial step of h s, to ``out``, in the order of ws.gaps; after update_gaps(). ``kin``: of the
-    end, with its geoms.
+    """Write the gaps at the end of a trial step of h s to ``out``, in the order of ws.gaps: those
+    of the pairs with tracked points and of these points. After update_gaps(). ``kin``: of the end,
+    with its geoms.
 
-    Points that the manifold at the end lacks get FAR; so do all points of a pair that touches at an
-    internal edge alone. Points that touch and are not tracked yet are added.
+    Tracked points that are not in the manifold at the end get FAR; so do all points of a pair that
+    touches only at an internal edge. Points that touch and are not tracked yet are added.
     """
     counts, contacts = ws.gap_counts[0], ws.contacts
     first = counts.fixed - len(s.pairs)
@@ -171,11 +174,12 @@ def update_point_gaps(s: System, ws: Workspace, kin: Kinematics, h: float,
 @compiled
 def is_contact_of_step(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int,
                        at: np.record, h: float) -> bool:
-    """Whether a point of pair k, ``at``, found at the middle of a step of h s, is a contact of it.
+    """Whether ``at``, a point of pair k at the middle of a step of h s, is a contact of the step.
 
     A tracked point is one if its gap in contacts.gaps_active is at most scalars.touching. Any other
-    is one if its gap, extrapolated to the start of the step where it approaches, is at most SLOW h:
-    too small for an impact. ``kin``: of q and v at the middle.
+    is one if its gap at the step's start is at most SLOW h: too small for an impact. That gap is
+    extrapolated back from the middle, by the approach speed there (0 if it recedes). ``kin``: of q
+    and v at the middle.
     """
     i = find_point(ws, k, at.feature_id)
     if i != NONE:

@@ -40,7 +40,9 @@ def add_sums(sums: Sums, share: float, a: Sums) -> Sums:
 
 @compiled
 def edge_sums(ax: float, ay: float, bx: float, by: float) -> Sums:
-    """Integrals along the straight line from a to b, both from the center."""
+    """Return the integrals listed at Sums, in that order, along the straight line from a to b, m,
+    both relative to the center of rotation; not divided by an area or length.
+    """
     ex, ey = bx - ax, by - ay
     length = math.sqrt(ex * ex + ey * ey)
     if length == 0.0:
@@ -73,7 +75,7 @@ def segment_moments(ex: float, ey: float, x: float, y: float) -> Moments:
 
 @compiled
 def disc_moments(radius: float, x: float, y: float) -> Moments:
-    """Moments of the disc about the center (x, y)."""
+    """Moments of the disc about the center of rotation (x, y), by twelve points: see COSINES."""
     sums = NO_SUMS
     for k in range(12):
         c, s = COSINES[k], COSINES[k - 3 if k >= 3 else k + 9]
@@ -102,9 +104,11 @@ def polygon_moments(u: np.ndarray, v: np.ndarray, count: int, area: float, x: fl
 
 @compiled
 def moments(sums: Sums, x: float, y: float, dimensions: int) -> Moments:
-    """Means over a patch of y/|y|, of it times either coordinate from the patch's own origin, and
-    of |y| likewise: (2), (2), (2), (1), (2). (x, y): the center; ``dimensions``: 2 of an area, 0
-    where the sums are over the patch itself.
+    """Return Moments: the means over a patch of y/|y| (2), of y/|y| times the first coordinate (2)
+    and times the second (2), of |y| (1), and of |y| times both coordinates (2), where y is relative
+    to the center of rotation; the coordinates, and the center (x, y), to the patch's own origin.
+    ``sums``: Sums, divided by the patch's area or length. ``dimensions``: 2 if they are over the
+    boundary of an area, 0 if over the patch itself.
     """
     none, one, two = (1.0, 1.0, 1.0) if dimensions == 0 else (1 / 2, 1 / 3, 1 / 4)
     jx, jy, m = none * sums[0], none * sums[1], one * sums[5]

@@ -42,7 +42,9 @@ def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, v: np.
 @compiled
 def newton_euler_forward(tree: np.ndarray, i: int, gravity: np.ndarray, v: np.ndarray,
                          kin: Kinematics, dyn: Dynamics) -> None:
-    """Write dyn.accelerations[i] at dv/dt = 0, and the force it takes to dyn.bias_forces[i]."""
+    """Write dyn.accelerations[i] at dv/dt = 0, less gravity, and the spatial force that this takes
+    to dyn.bias_forces[i].
+    """
     body, velocity, acceleration = tree[i], kin.spatial_velocities[i], dyn.accelerations[i]
     w = vec(velocity)
     if body.parent < 0:

@@ -165,8 +165,8 @@ def aba_backward(body: np.record, i: int, q: np.ndarray, v: np.ndarray, kin: Kin
 
 @inlined
 def aba_forward(body: np.record, i: int, kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
-    """Third pass, after the parent of body i: dyn.bias_forces[i] becomes its spatial acceleration;
-    write dv/dt of its joint to ``out`` (nv,).
+    """Third pass, after the parent of body i: dyn.bias_forces[i] becomes its spatial acceleration
+    less gravity; write dv/dt of its joint to ``out`` (nv,).
     """
     acceleration = dyn.bias_forces[i]
     for k in range(6):

@@ -162,7 +162,9 @@ def rotate_inertias(tree: np.ndarray, kin: Kinematics, matrix: np.ndarray) -> No
 
 @compiled
 def point_of_body(body: np.record, kin: Kinematics, i: int, point: np.ndarray) -> Vec3:
-    """Position, m, from the root of a point (3,) m given along the principal axes of body i."""
+    """Position, m, from the root, world axes, of a point (3,) of body i that is given from its
+    center of mass along its principal axes, m.
+    """
     return add(vec(kin.positions[i]), quat_rotate(inertial_frame(body, kin, i), vec(point)))
 
 

@@ -33,7 +33,9 @@ act on, 1/kg or 1/(kg m^2)."""
 @compiled
 def load_in_world(body: np.record, kin: Kinematics, i: int,
                   load: np.record) -> tuple[Vec3, Vec3]:
-    """Force, N, and torque, N m, of a load on body i, along the world's axes."""
+    """Force, N, and torque, N m, of a load on body i, along the world's axes; the torque without
+    the moment of the force.
+    """
     force, torque = vec(load.force), vec(load.torque)
     if load.local == 0:
         return force, torque

@@ -47,9 +47,10 @@ def composite_inertias(tree: np.ndarray, kin: Kinematics, composite: np.ndarray)
 @compiled
 def mass_matrix(tree: np.ndarray, dof_parent: np.ndarray, dof_body: np.ndarray, kin: Kinematics,
                 dyn: Dynamics) -> None:
-    """Write the mass matrix to the lower triangle of dyn.H, where it is not zero by structure, and
-    dyn.composite_inertias. ``kin`` has all motion subspaces, also the roots', and inertias. That of
-    kinematic bodies is infinite, so that no force or impulse changes their velocities.
+    """Write the mass matrix to dyn.H: the entries of its lower triangle that are not zero by
+    structure. Also write dyn.composite_inertias. ``kin`` must have the inertias and all motion
+    subspaces, also the roots'. Rows of kinematic bodies get an infinite diagonal and else zeros, so
+    that no force or impulse changes their velocities.
     """
     composite_inertias(tree, kin, dyn.composite_inertias)
     for d in range(len(dof_parent)):

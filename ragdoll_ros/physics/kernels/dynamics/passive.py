@@ -12,8 +12,8 @@ STEEPEST = 40.0
 
 @compiled
 def passive_torque(body: np.record, axis: int, angle: float) -> tuple[float, float, float]:
-    """Torque, N m, at an ``angle`` of the joint of ``body``, rad, its decrease with the angle,
-    N m/rad, and the elastic energy, J.
+    """Return the passive torque, N m, about axis ``axis`` of the joint of ``body`` at ``angle``,
+    rad; its stiffness, minus the derivative of the torque, N m/rad; and the elastic energy, J.
     """
     torque = stiffness = energy = 0.0
     for end in range(2):

@@ -40,7 +40,8 @@ ACCELERATION_FACTOR = 1.5
 @compiled
 def dop853_step(s: System, ws: Workspace, cluster: ClusterState, h: float) -> float:
     """Compute a step of h s from cluster.q and v: write its polynomial to cluster.dense_output and
-    the state derivatives at its ends to cluster.end_rates. Returns its error, m or rad.
+    the state derivatives at its ends to cluster.end_rates. The derivative at the start is taken
+    from there if dense_step.first_rate_known. Returns step_error(), m or rad.
     """
     tree, flight = s.tree, ws.flight
     q, v, dense, rates, k, y = (cluster.q, cluster.v, cluster.dense_output, cluster.end_rates,
@@ -100,9 +101,10 @@ def evaluate_dense_step(tree: np.ndarray, cluster: ClusterState, time: float, q:
 def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance: float,
                      longest: float) -> bool:
     """Make a dense step from cluster.q and v, as long as its error allows, at most ``longest`` s.
-    Returns whether one was found whose error is at most ``tolerance``, m or rad, or what rounding
-    leaves: a light root with a heavy tip loses as many digits as their masses are apart, and
-    shorter steps have no less of that error over the same time.
+    Returns whether one was found whose error is at most ``tolerance``, m or rad, or at most the
+    rounding error, if that is larger. Rounding errors over a given time are not reduced by shorter
+    steps. They are large where a light root has a heavy tip: as many digits are lost as the ratio
+    of their masses has.
     """
     step = cluster.dense_step[0]
     if step.next_length <= 0:
@@ -148,7 +150,9 @@ def largest_rate(cluster: ClusterState) -> float:
 
 @compiled
 def first_length(s: System, ws: Workspace, cluster: ClusterState) -> float:
-    """Length, s, of the first step that is tried, by the fastest body's angular speed."""
+    """Length, s, of the first step that is tried: in it the fastest body turns by FIRST_ANGLE.
+    Overwrites ws.flight.kinematics.
+    """
     kin, fast = ws.flight.kinematics, 1e-9
     forward_kinematics(s.tree, cluster.q, cluster.v, kin)
     for i in range(len(s.tree)):

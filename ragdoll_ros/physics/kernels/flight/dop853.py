@@ -73,7 +73,7 @@ _ERRORS = (
 
 
 def _filled(rows: tuple, wide: int) -> np.ndarray:
-    """Matrix whose rows have these numbers in these places, else zero."""
+    """Return a matrix, ``wide`` columns, of sparse rows: each a tuple of (column, number)."""
     filled = np.zeros((len(rows), wide))
     for row, numbers in enumerate(rows):
         for place, number in numbers:
@@ -109,10 +109,10 @@ def weighted_sum(weights: np.ndarray, count: int, k: np.ndarray, h: float, out: 
 
 @compiled
 def step_error(k: np.ndarray, h: float, nq: int, scratch: np.ndarray) -> float:
-    """DOP853's estimate of the error of a step of h s (Hairer, Norsett, Wanner, II.10), of the
-    largest errors of orders 5 and 3: those of coordinates, m or rad, and of velocities times
-    SLOWEST, where Hairer takes the mean squares. Infinity if a number is not finite.
-    ``k`` (16, nq + nv): derivatives at the stages. ``scratch`` (nq + nv,).
+    """Return DOP853's estimate of the error of a step of h s (Hairer, Norsett, Wanner, II.10), m or
+    rad, from the errors of orders 5 and 3. The norm of each is its largest component; Hairer takes
+    the root mean square. Components of velocities are multiplied by SLOWEST. Infinity if a number
+    is not finite. ``k`` (16, nq + nv): derivatives at the stages. ``scratch`` (nq + nv,).
     """
     fifth, third, all_of_it = 0.0, 0.0, 0.0
     weighted_sum(ERRORS[0], 16, k, h, scratch)

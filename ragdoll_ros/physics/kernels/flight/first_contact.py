@@ -41,7 +41,9 @@ LEAST_CHANGE = 1e-3
 
 @compiled
 def time_to_close(gap: float, closing: float, acceleration: float) -> float:
-    """Least time, s, for a gap that closes at a speed to close, by a bound on acceleration."""
+    """Least time, s, for a gap that closes at a speed to close, by a bound on acceleration. Of a
+    gap of 0 or less: 0 if it closes, else until it is back at its value.
+    """
     if gap <= 0.0:
         return 0.0 if closing > 0 else -2 * closing / acceleration
     root = math.sqrt(closing * closing + 2 * acceleration * gap)
@@ -52,11 +54,11 @@ def time_to_close(gap: float, closing: float, acceleration: float) -> float:
 def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                          gaps: np.ndarray, acceleration: float,
                          acceleration_in_free_fall: float, end_rates: np.ndarray) -> float:
-    """Lower bound, s, of the time until a gap falls to its flight.contact_gaps; ``kin`` is that of
-    q and v, with its geoms. Overwrites contacts.manifold. ``acceleration``, m/s^2: bound for points
-    near the ground or static geoms; ``acceleration_in_free_fall``: relative to free fall, for each
-    of two bodies that move. ``end_rates`` (2, nq + nv): state derivatives at the ends of the step,
-    for the limited joints.
+    """Return a lower bound, s, of the time until a gap falls to its entry in flight.contact_gaps.
+    ``kin``: of q and v, with its geoms. Bounds, m/s^2: ``acceleration``, for points against the
+    ground or static geoms; ``acceleration_in_free_fall``, relative to free fall, for each of two
+    bodies that move. ``end_rates`` (2, nq + nv): state derivatives at the ends of the step, for the
+    limited joints. Overwrites contacts.manifold.
     """
     least, n, contact = math.inf, 0, ws.flight.contact_gaps
     for k in range(len(s.geoms)):
@@ -93,8 +95,9 @@ def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarra
 @compiled
 def pair_time_to_close(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, k: int, gap: float,
                        contact: float, acceleration: float) -> float:
-    """Least time, s, for the ``gap`` of pair k, m, to fall to ``contact``, of all points of its
-    manifold where it is near: another than the nearest may close first.
+    """Least time, s, in which the ``gap`` of pair k, m, can fall to ``contact``, m; of a near pair,
+    by all points of its manifold, as another than the nearest may close first. ``acceleration``,
+    m/s^2: bound on the relative one. Overwrites contacts.manifold.
     """
     pair, manifold = s.pairs[k], ws.contacts.manifold
     a, b = s.geoms[pair.a], s.geoms[pair.b]
@@ -124,13 +127,15 @@ def pair_time_to_close(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
 
 @compiled
 def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
-    """Write the time of the first contact along the step to dense_step.event_time, s; if there is
-    none, it stays infinite.
+    """Find the time of the first contact along the dense step and write it to
+    dense_step.event_time, s; if there is none, event_time stays infinite.
 
-    By conservative advancement (Mirtich 1996): no gap closes before its speed and the largest
-    acceleration allow, and near a contact these steps converge as Newton's. Where a gap is found
-    closed all the same, regula falsi goes back (Illinois: Dowell and Jarratt, BIT 11, 1971). What
-    touches at the start counts from when it has separated.
+    By conservative advancement (Mirtich 1996): each advance is the time in which no gap can close,
+    by its speed and a bound on accelerations. Near a contact these advances converge like Newton's
+    method. If a gap is found closed, regula falsi searches the last advance (Illinois: Dowell and
+    Jarratt, BIT 11, 1971). What touches at the start counts once it has separated or penetrates
+    deeper, see set_contact_gaps(). After MAX_SAMPLES instants the last one becomes event_time, and
+    stats.toi_failures is incremented.
     """
     flight, step, gaps = ws.flight, cluster.dense_step[0], ws.contacts.gaps_end
     q, v, kin = flight.q, flight.v, flight.kinematics
@@ -166,7 +171,9 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def lower_pair_gaps(s: System, ws: Workspace, gaps: np.ndarray, distance: float) -> None:
-    """Lower the gaps of pairs by a ``distance``, m, by which accelerations may have closed them."""
+    """Subtract ``distance``, m, from the gaps of pairs: accelerations may have closed them by as
+    much, and update_gaps() bounds the motion by speeds alone.
+    """
     fixed = ws.gap_counts[0].fixed
     for j in range(fixed - len(s.pairs), fixed):
         gaps[j] -= distance
@@ -174,10 +181,10 @@ def lower_pair_gaps(s: System, ws: Workspace, gaps: np.ndarray, distance: float)
 
 @compiled
 def set_contact_gaps(ws: Workspace) -> None:
-    """Write flight.contact_gaps, m or rad, at which gaps count as contacts: 0; those that touch now
-    must first penetrate by 2 TOUCHING, and by TOUCHING more than now: else what penetrates already
-    would be a contact at once, and again after each impact. Never below DEEPEST_START: what
-    penetrates farther does not fly.
+    """Write flight.contact_gaps, m or rad, the gaps at which contacts count: 0 for a gap above
+    TOUCHING, else the smaller of -2 TOUCHING and the present gap less TOUCHING, but at least
+    DEEPEST_START: what penetrates farther does not fly. So what touches must first penetrate
+    deeper: else an existing penetration would be a contact at once, and again after each impact.
     """
     for j in range(ws.gap_counts[0].fixed):
         ws.flight.contact_gaps[j] = 0.0 if ws.gaps[j] > TOUCHING else max(
@@ -195,8 +202,8 @@ def least_gap(ws: Workspace, gaps: np.ndarray) -> float:
 
 @compiled
 def reset_separated(ws: Workspace, gaps: np.ndarray) -> None:
-    """Let gaps that have separated count as contacts when they close, at an instant before which
-    refine_contact_time() will not look.
+    """Set contact_gaps of all gaps above TOUCHING to 0, so that these count as contacts when they
+    close again. refine_contact_time() must not search before this instant.
     """
     for j in range(ws.gap_counts[0].fixed):
         if gaps[j] > TOUCHING:
@@ -206,8 +213,9 @@ def reset_separated(ws: Workspace, gaps: np.ndarray) -> None:
 @compiled
 def refine_contact_time(s: System, ws: Workspace, cluster: ClusterState, early: float,
                         late: float) -> float:
-    """Time, s, between ``early`` and ``late`` at which the least gap is within CLOSED of 0;
-    ``early`` if it is closed then. Overwrites q, v and kinematics of ws.flight and
+    """Find the time, s, between ``early`` and ``late`` at which the first gap closes, by regula
+    falsi: least_gap() is within CLOSED of 0, or the bracket is shorter than 1e-13 s. Returns
+    ``early`` if least_gap() is not positive there. Overwrites q, v and kinematics of ws.flight and
     contacts.gaps_end.
     """
     flight, gaps = ws.flight, ws.contacts.gaps_end

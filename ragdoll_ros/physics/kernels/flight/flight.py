@@ -44,10 +44,11 @@ GAUSS_LEGENDRE = (
 
 @compiled
 def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> bool:
-    """Whether a flight may begin: no contact carried weight in the last step, unless that ended
-    with an impact, all that touch separate and, where any touch and dolls have joints, no gap can
-    close within WORTHWHILE times ``nominal``, the length of a contact step, s. ws.gaps are current.
-    Overwrites contacts.found and ws.flight.
+    """Return whether a flight may begin. No contact may have carried weight in the last step,
+    unless that step ended with an impact. All contacts must separate. Where something touches and
+    dolls have joints, no gap may be able to close within WORTHWHILE times ``nominal``, the length
+    of a contact step, s. ws.gaps must be current. Overwrites contacts.found, ws.flight and, with
+    values at the same pose, ws.gaps.
     """
     q, v, stats, flight = cluster.q, cluster.v, ws.stats[0], ws.flight
     kin, g = flight.kinematics, norm(vec(s.gravity))
@@ -76,7 +77,10 @@ def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> 
 
 @compiled
 def contacts_separate(s: System, ws: Workspace, cluster: ClusterState, m: int) -> bool:
-    """Whether all m contacts found separate, and no joint presses on a limit it leans on."""
+    """Return whether all m contacts found separate: points faster than SEPARATION_SPEED, joint
+    limits neither approaching nor, if slower than that, accelerated towards the limit.
+    flight.kinematics: of q and v.
+    """
     q, v, flight = cluster.q, cluster.v, ws.flight
     kin, leaning = flight.kinematics, False
     for i in range(m):

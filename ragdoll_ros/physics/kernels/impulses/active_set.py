@@ -22,7 +22,9 @@ TURNS = 4
 
 @compiled
 def is_convex(members: np.ndarray, m: int) -> bool:
-    """Whether no friction of m contacts is bounded by its normal impulse."""
+    """Return whether all m contacts have either no friction or unlimited friction (NO_SLIP), and no
+    rolling friction: then the problem is convex.
+    """
     for k in range(m):
         member = members[k]
         if member.kind != LIMIT and (0.0 < member.friction < NO_SLIP or (
@@ -35,10 +37,10 @@ def is_convex(members: np.ndarray, m: int) -> bool:
 def solve_active_set(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray,
                      tolerance: float) -> bool:
     """Solve a convex island of m contacts and n rows for p (n,) in place, starting from p. Returns
-    whether a solution was found.
+    whether a solution was found; if not, p is the last iterate.
 
-    ``tolerance``: m/s at which a contact without impulse may approach. The Cholesky factor of W at
-    the active rows, ``places``, is kept in island.G.
+    ``tolerance``: m/s at which a contact without impulse may approach. island.places lists the
+    active rows, island.G holds the Cholesky factor of W at these rows.
     """
     W, U, z, places = island.W, island.G, island.active, island.places
     count = initial_active_set(island, m, p)
@@ -119,8 +121,8 @@ def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: in
 
 @compiled
 def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, end: int) -> None:
-    """Write the column of row places[end] to rows 0 to end - 1 of the factor U; its diagonal entry
-    is left to factor_rows().
+    """Write column ``end`` of the factor U, for row places[end] of W, above its diagonal: rows 0 to
+    end - 1. factor_rows() computes the diagonal entry.
     """
     at = places[end] * n
     for k in range(end):
@@ -132,7 +134,9 @@ def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, end:
 
 @compiled
 def remove_column(U: np.ndarray, n: int, places: np.ndarray, drop: int, count: int) -> None:
-    """Remove ``places[drop]``, leaving ``count``, and its column from the rows of U above."""
+    """Remove entry ``drop`` from ``places`` and column ``drop`` from rows 0 to drop - 1 of U;
+    ``count`` columns remain. The rows from ``drop`` on must be factored again.
+    """
     for j in range(drop, count):
         places[j] = places[j + 1]
     for k in range(drop):

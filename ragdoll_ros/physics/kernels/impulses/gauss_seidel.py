@@ -35,8 +35,9 @@ def add_velocity_change(W: np.ndarray, n: int, j: int, change: float, u: np.ndar
 @compiled
 def gauss_seidel_sweep(members: np.ndarray, m: int, n: int, W: np.ndarray, b: np.ndarray,
                        p: np.ndarray, u: np.ndarray) -> float:
-    """Solve each of m contacts in turn for its impulses, in place in p (n,). Returns the largest
-    change of a velocity, m/s or rad/s. u (n,) becomes W p + b.
+    """Do one projected Gauss-Seidel sweep: solve each of m contacts in turn for its impulses, in
+    place in p (n,). Returns the largest change of a row's velocity by its own impulse, m/s or
+    rad/s. u (n,) becomes W p + b with the new p.
     """
     worst = 0.0
     velocities(W, b, p, n, u)

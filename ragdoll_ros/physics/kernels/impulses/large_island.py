@@ -50,7 +50,10 @@ IMMOVABLE = 1e30
 @compiled
 def solve_large(s: System, ws: Workspace, m: int, n: int, h: float, has_restitution: bool,
                 has_penetration: bool) -> None:
-    """Solve an island over h s as solve_small() does, except that curvature is neglected."""
+    """Solve an island over h s as solve_small() does, but without W and curvature bias, to its own
+    tolerance, and with COMPLIANCE also at impacts. Impulses never add energy. Raises
+    scalars.residual to the residual left.
+    """
     island, b, p, u = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity)
     island.newton_dofs[0] = -1
     tolerance = max(TOLERANCE, ws.step.scalars[0].solve_error * min(
@@ -93,9 +96,9 @@ def largest(values: np.ndarray, n: int) -> float:
 
 @compiled
 def scale_initial_impulses(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray) -> None:
-    """Scale p (n,), the impulses of the step before, by the share from 0 to 1 that minimizes
-    p (b + W p / 2): after an impact all of them would be too much. Overwrites the island's
-    velocities with those of the unscaled p.
+    """Scale the initial impulses p (n,) by the share from 0 to 1 that minimizes p (b + W p / 2):
+    after an impact, those of the step before are too large. Overwrites island.z and island.velocity
+    with those of the unscaled p.
     """
     write_velocities(ws, m, b, p)
     work, spent = work_terms(ws.island, n, b, p)
@@ -106,9 +109,10 @@ def scale_initial_impulses(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.n
 
 @compiled
 def newton_dof_count(s: System, ws: Workspace, m: int) -> int:
-    """Number of degrees of freedom for Newton's method on an island, after the symbolic ordering of
-    its matrix; 0 if the method takes more work than SWEEP_WORK for each entry of a sweep, or memory
-    is short. Computed once for an island and kept in island.newton_dofs.
+    """Return the number of degrees of freedom for sparse_newton() on an island, after
+    find_sparsity(); 0 if an elimination takes more work than SWEEP_WORK times the number of entries
+    of the island's rows, or if memory is short. Computed once for an island and kept in
+    island.newton_dofs.
     """
     known = ws.island.newton_dofs
     if known[0] < 0:
@@ -125,10 +129,12 @@ def newton_dof_count(s: System, ws: Workspace, m: int) -> int:
 def solve_rows(s: System, ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
                tolerance: float, rounds: int) -> tuple[float, int]:
     """Solve the contact laws on the row velocities W p + b for the impulses p (n,), in place from
-    the given p: by sweeps and, where these stall, Newton's method, in at most ``rounds`` rounds.
+    the given p: in at most ``rounds`` rounds of sweeps and, where these stall, Newton's method. If
+    that costs too much, a last run of at most MAX_SWEEPS sweeps replaces it.
 
     b (n,): row velocities without p, m/s; for position correction displacements, m. Returns the
-    residual, m/s or m, and the number of sweeps. island.z becomes Y^T p.
+    residual, m/s or m, and the number of sweeps; if sweeps came last, the residual is the largest
+    velocity change of the last sweep. island.z becomes Y^T p.
     """
     left, done, most = linearize(ws, m, b, p)[0], 0, LARGE_SWEEPS
     for _ in range(rounds):
@@ -149,9 +155,10 @@ def solve_rows(s: System, ws: Workspace, m: int, n: int, b: np.ndarray, p: np.nd
 @compiled
 def reduce_restitution(s: System, ws: Workspace, m: int, n: int, tolerance: float,
                        failed: bool) -> float:
-    """Move island.impulses towards those without restitution until they add no energy; see
-    small_island.bound_energy(); all the way if their solve has ``failed``. Returns the residual of
-    those without, m/s; island.z becomes Y^T p.
+    """Move island.impulses towards the impulses without restitution until they add no energy, see
+    small_island.bound_energy(). If ``failed``, the solve with restitution found no solution, and
+    they are replaced. Overwrites island.soft. Returns the residual of the solve without
+    restitution, m/s; island.z becomes Y^T p.
     """
     island = ws.island
     p, soft, u, z, bounced = (island.impulses, island.soft, island.free_velocity, island.z,
@@ -185,7 +192,10 @@ def reduce_restitution(s: System, ws: Workspace, m: int, n: int, tolerance: floa
 
 @compiled
 def diagonal_blocks(ws: Workspace, m: int, compliance: float) -> None:
-    """Write W's diagonal blocks to island.blocks, their diagonals times 1 + ``compliance``."""
+    """Write the diagonal blocks of W to island.blocks, their diagonal entries times 1 +
+    ``compliance``, or IMMOVABLE where they are zero. Sets each members[].compliance to
+    ``compliance``.
+    """
     island = ws.island
     for k in range(m):
         c, block = ws.contacts.found[island.members[k].contact], island.blocks[k]
@@ -211,7 +221,9 @@ def keep_normals_only(island: Island, m: int) -> None:
 
 @compiled
 def row_velocity(ws: Workspace, k: int, e: int, b: np.ndarray, p: np.ndarray) -> float:
-    """Velocity, m/s or rad/s, along row e of member k; island.z is Y^T p."""
+    """Return the velocity, m/s or rad/s, along row e of member k: b + W p there, with the member's
+    compliance in W. island.z must be Y^T p.
+    """
     island, member = ws.island, ws.island.members[k]
     row, soft, support = member.row + e, member.compliance, island.support[member.contact]
     total = b[row] + p[row] * island.blocks[k, e, e] * soft / (1 + soft)
@@ -270,8 +282,10 @@ def sweep_large_island(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> f
 @compiled
 def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
                        most: int, tolerance: float) -> tuple[float, int]:
-    """Solve for p (n,) in place, starting from p, in at most so many sweeps. Returns the last one's
-    largest change of a velocity, m/s or rad/s, and their number. island.z becomes Y^T p.
+    """Solve for p (n,) in place, starting from p, by at most ``most`` sweeps with Anderson
+    acceleration, until a sweep changes no velocity by more than ``tolerance``, m/s or rad/s.
+    Returns the largest change in the last sweep and the number of sweeps. island.z becomes Y^T p.
+    Overwrites island.residual.
     """
     island, weights = ws.island, ws.island.residual
     start, z = island.anderson.start, island.z

@@ -61,11 +61,12 @@ def alart_curnier(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray) 
 
 @compiled
 def list_unknowns(island: Island, m: int, n: int, p: np.ndarray) -> int:
-    """Write what a Newton step from p is to find to island.unknowns, and the part of the step that
+    """Write the unknowns of a Newton step from p to island.unknowns, and the part of the step that
     is known before to island.direction. Returns the number of unknowns. After alart_curnier().
 
-    Open contacts lose their impulses. Of friction that slips, the part along the slip follows from
-    the normal impulse; the part across it is unknown.
+    Open contacts lose their impulses, except tangential ones of unlimited friction. Of friction
+    that slips, the part along the slip follows from the normal impulse; the part across it is
+    unknown.
     """
     W, u, direction, unknowns, count = island.W, island.velocity, island.direction, (
         island.unknowns), 0
@@ -105,9 +106,12 @@ def list_unknowns(island: Island, m: int, n: int, p: np.ndarray) -> int:
 @compiled
 def add_slip(island: Island, normal: np.record, k: int, d: tuple[float, float], law: float,
              offset: float, own: float) -> None:
-    """Add friction along a slip of direction d, rows normal.row + k and the next, to the unknown
-    ``normal``, times the coefficient ``law``, and the part that does not depend on it to
-    island.direction. ``offset``: of that part, N s; ``own``: diagonal entry of W.
+    """Make friction along a slip depend on the unknown ``normal``: its direction gets the entries
+    ``law`` times d at k and k + 1, its width becomes k + 2. Write the part of the friction step
+    that does not depend on it to island.direction, rows normal.row + k and the next. k: 1 for
+    friction, 3 for rolling; d: unit vector of the friction impulse; ``law``: coefficient;
+    ``offset``: law u_n / W_nn, N s; ``own``: diagonal entry of W by which island.residual is scaled
+    in these rows.
     """
     i, residual = normal.row + k, island.residual
     normal.width, normal.direction[k], normal.direction[k + 1] = k + 2, law * d[0], law * d[1]
@@ -175,7 +179,10 @@ def add_unknowns(island: Island, count: int) -> None:
 @compiled
 def newton(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
            proximal: float) -> float:
-    """Take Newton steps from p, which becomes the best found. Returns its residual, m/s."""
+    """Take full Newton steps from p, at most MAX_STEPS, until the residual is at most
+    ``tolerance``, m/s, or the steps cycle (PATIENCE). ``proximal``: share of W's diagonal that
+    resists the change of an impulse. p becomes the best iterate. Returns its residual, m/s.
+    """
     direction, keep = island.direction, island.best
     best, late = math.inf, 0
     for turn in range(MAX_STEPS + 1):

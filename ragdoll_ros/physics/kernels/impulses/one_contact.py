@@ -15,14 +15,15 @@ MAX_ITERATIONS = 50
 
 @compiled
 def solve_one_contact(W: np.ndarray, n: int, a: int, c: Vec3, guess: Vec3, mu: float) -> Vec3:
-    """Impulse, N s, of the contact whose rows of W (flat, n a row), normal and two tangents, begin
-    at a, and whose velocity without it is c, m/s; friction coefficient mu. ``guess``: an impulse to
-    start from.
+    """Return the impulse, N s, of one contact. Its rows of W (flat, n a row), normal and two
+    tangents, begin at a; its velocity without the impulse is c, m/s; friction coefficient mu.
+    ``guess``: an impulse to start from. With unlimited friction (NO_SLIP) a contact that opens
+    still gets a tangential impulse.
 
-    A sliding contact has u_t = -d p_t with a drag d > 0, and u_n = 0: linear for given d. Sought
-    is the d at which |p_t| = mu p_n. It exists, as d = 0 gives more (else the contact would stick)
-    and infinite d gives none: by Newton's method on mu p_n / |p_t|, nearly a line in d, between
-    bounds.
+    A sliding contact has u_n = 0 and u_t = -d p_t with a drag d > 0: for given d, the system is
+    linear. The drag with |p_t| = mu p_n exists, as d = 0 gives a larger |p_t| (else the contact
+    would stick) and infinite d gives none. It is found by Newton's method on mu p_n / |p_t|, nearly
+    a line in d, between bounds.
     """
     at = a * n + a
     w00, w01, w02 = W[at], W[at + 1], W[at + 2]

@@ -24,8 +24,10 @@ STRAIGHT = 1e-11
 def solve_small(ws: Workspace, m: int, n: int, h: float, tolerance: float, has_restitution: bool,
                 has_penetration: bool) -> None:
     """Solve an island of m contacts and n rows over h s, or at an impact, h = 0, for
-    island.impulses; if ``has_penetration``, also for island.correction. After assemble_rhs().
-    ``has_restitution``: the right-hand side asks for restitution, which may add energy.
+    island.impulses; if ``has_penetration`` (a member has a ``correction``), also for
+    island.correction. After assemble_rhs(). ``tolerance``: residual, m/s. ``has_restitution``: the
+    right-hand side contains restitution. If restitution adds energy, bound_energy() reduces it; if
+    a step (h > 0) has no solution with restitution, it is left out.
     """
     island, b, p, u, soft = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity,
                              ws.island.soft)
@@ -101,10 +103,12 @@ def form_contact_matrix(ws: Workspace, m: int, n: int, compliance: float) -> Non
 
 @compiled
 def add_curvature_bias(island: Island, m: int, n: int) -> None:
-    """Add the curvature bias to island.rhs, as far as it is a motion of the bodies: in a patch that
-    turns it is more than any impulses could answer. Contacts that separate get all of theirs.
+    """Add the curvature bias to island.rhs, filtered to what motions of the bodies can produce: in
+    a patch that turns, the whole bias is more than any impulses can answer. Contacts that separate
+    get their whole bias. If no entry exceeds STRAIGHT in size, nothing is filtered.
 
-    That motion is W x, where (W + R) x is the bias, and R a little of W's diagonal.
+    The filtered bias is W x, where (W + R) x is the bias and R a small share of W's diagonal.
+    Overwrites island.G and island.correction.
     """
     W, G, curve, b, x = island.W, island.G, island.curvature, island.rhs, island.correction
     most = size = 0.0
@@ -169,7 +173,9 @@ def energy_gain(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
 
 @compiled
 def scale_to_energy_bound(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
-    """Scale impulses p (n,) that are no solution down so that they add no energy."""
+    """Scale impulses p (n,), which need not solve the contact laws, down so that they add no energy
+    to row velocities u: p (u + W p / 2) <= 0.
+    """
     work = spent = 0.0
     for i in range(n):
         w = 0.0
@@ -182,8 +188,8 @@ def scale_to_energy_bound(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -
 
 @compiled
 def bound_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n: int) -> None:
-    """Move p (n,) towards ``soft``, the impulses without restitution, until it adds no more energy
-    to row velocities u than these, which add none.
+    """Move p (n,) towards ``soft``, the impulses without restitution, until it adds no energy to a
+    motion with row velocities u. ``soft`` must add none.
 
     Newton's law with friction can add energy (Kane and Levinson 1985). Soft impulses never do: p u+
     <= 0 and so p (u + W p / 2) = p u+ - p W p / 2 < 0. Between both, all impulses are within their

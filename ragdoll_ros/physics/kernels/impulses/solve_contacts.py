@@ -65,13 +65,13 @@ def label_islands(s: System, ws: Workspace, m: int) -> None:
 @compiled
 def solve_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                    v_free: np.ndarray, m: int, h: float, tolerance: float) -> None:
-    """Solve m contacts over h s in which v becomes ``v_free`` without them. Writes to ws.step their
-    change of velocity, v_change (nv,), and the displacement of position correction, correction
-    (nv,). Contacts are read from ws.contacts.found; impulses start from there and are written
-    there.
+    """Solve m contacts over h s, or at an impact, h = 0. ``v_free``: what v becomes without them.
+    Writes to ws.step the change of velocity by contacts, v_change (nv,), and the displacement by
+    position correction, correction (nv,), m or rad, zero at an impact. contacts.found gives the
+    contacts and their initial impulses, and receives the impulses.
 
-    h = 0: an impact. ``kin``: of q, with the roots' motion subspaces; dynamics.H: factor of the
-    mass matrix. ``tolerance``: m/s of the residual of small islands.
+    ``kin``: of q, with the roots' motion subspaces; dynamics.H: factor of the mass matrix.
+    ``tolerance``: m/s of the residual of small islands.
     """
     contacts, island, L = ws.contacts.found, ws.island, ws.step.dynamics.H
     change, correction = ws.step.v_change, ws.step.correction
@@ -138,13 +138,13 @@ def count_solve(s: System, ws: Workspace, number: int, count: int, rows: int) ->
 
 @compiled
 def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bool, bool]:
-    """Write the right-hand side of an island: its rows' velocities without impulses to
-    island.free_velocity, the same with restitution and gaps to island.rhs, the curvature bias, the
-    initial impulses, and in its members the penetrations to correct. Returns whether a contact has
-    restitution, and whether one has penetration. After contact_jacobian().
+    """Write the right-hand side of an island: copy the row velocities without impulses, island.rhs,
+    to island.free_velocity, then add restitution and gaps to island.rhs. Also write the curvature
+    bias, the initial impulses, and the penetration that each member is to correct. Returns whether
+    island.rhs has restitution, and whether a member has penetration. After contact_jacobian().
 
-    Rows at the middle of a step contain the curvature term h/2 dJ/dt v of J v. The target row
-    velocity of a persistent contact is minus that term, for J v to be 0 at the end.
+    In the middle of a step, J v differs from its start by the curvature term h/2 dJ/dt v. The
+    target of a persistent contact is minus that term, so that J v is 0 at the step's end.
     """
     island = ws.island
     b, was, curve = island.rhs, island.start_velocity, island.curvature
@@ -186,9 +186,10 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
 
 @compiled
 def set_correction(ws: Workspace, member: np.record, c: np.record, h: float) -> None:
-    """Write to ``member`` the ``correction`` of the gap in h s, m or rad: CORRECTED_SHARE of a
-    penetration beyond SLOP, up to a greatest speed; where impacts are not sought, minus the gap of
-    a contact that is new, at any speed. Also its correction_compliance, if it is of two bodies.
+    """Write to ``member`` the ``correction`` of its penetration in h s, m or rad: CORRECTED_SHARE
+    of what exceeds SLOP, at most at MAX_SEPARATION_SPEED or MAX_LIMIT_SPEED. Where impacts are not
+    sought, a new contact gets all of its penetration, without a limit. Also write its
+    correction_compliance if it is between two bodies.
     """
     fastest = MAX_LIMIT_SPEED if c.kind == LIMIT else MAX_SEPARATION_SPEED
     member.correction = min(CORRECTED_SHARE * max(0.0, -c.gap - SLOP), fastest * h)
@@ -201,8 +202,9 @@ def set_correction(ws: Workspace, member: np.record, c: np.record, h: float) -> 
 
 @compiled
 def solve_island(s: System, ws: Workspace, m: int, n: int, h: float, tolerance: float) -> None:
-    """Solve one island. Writes its impulses to found[].impulse; adds their effects to v_change and
-    correction, both still to be multiplied by L^-1.
+    """Solve one island of m contacts and n rows over h s, or at an impact, h = 0. Writes its
+    impulses to found[].impulse. Adds Y^T times these to step.v_change, and Y^T times the impulses
+    of position correction to step.correction; the caller multiplies both by L^-1.
     """
     island, change, correction = ws.island, ws.step.v_change, ws.step.correction
     has_restitution, has_penetration = assemble_rhs(s, ws, m, n, h)

@@ -49,8 +49,9 @@ OPENING = 1e-4
 
 @compiled
 def clamp_to_cones(members: np.ndarray, m: int, p: np.ndarray) -> None:
-    """Clamp normal impulses of p to at least zero, then friction and rolling impulses to discs of
-    as much times their coefficient; where friction is unlimited (NO_SLIP) it is not changed.
+    """Clamp the normal impulses in p to at least zero, then friction and rolling impulses to discs
+    whose radius is the normal impulse times their coefficient. Unlimited friction (NO_SLIP) is not
+    changed.
     """
     for c in range(m):
         member = members[c]
@@ -66,8 +67,10 @@ def clamp_to_cones(members: np.ndarray, m: int, p: np.ndarray) -> None:
 @compiled
 def solve_cones(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
                 rounds: int) -> tuple[float, int]:
-    """Solve for p (n,) in place, starting from p, in at most so many rounds. Returns the largest
-    residual left, m/s, and the number of sweeps.
+    """Solve for p (n,) in place, starting from p, in at most ``rounds`` rounds; those that fail
+    relax the ``tolerance``, m/s, see LOOSER. Returns the residual left, m/s, and the number of
+    sweeps. The residual is the last velocity change if sweeps converged, and the tolerance if the
+    active set method did.
     """
     done, left, proximal, sweeps = 0, math.inf, PROXIMAL, SWEEPS
     convex = is_convex(island.members, m)
@@ -106,8 +109,9 @@ def solve_impulses(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray,
     """Solve for p (n,); arguments and return values as solve_cones().
 
     Unlimited friction makes the problem convex, but holds a contact sideways even as it opens. So
-    contacts that turn out to open are released, and all is solved once more. Those that then close
-    after all are held: between the two there is no solution (Painleve's paradox).
+    opening contacts of unlimited friction are released, by a friction of -1 in their members, and
+    all is solved again. Released contacts that then press get unlimited friction again, and all is
+    solved a last time: between the two there is no solution (Painleve's paradox).
     """
     left, done = solve_cones(island, m, n, b, p, tolerance, rounds)
     for turn in range(2):
@@ -134,8 +138,9 @@ def solve_impulses(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray,
 
 @compiled
 def solve_position_correction(island: Island, m: int, n: int) -> None:
-    """Write to island.correction (n,) the least normal impulses that give each contact the velocity
-    ``correction`` of its member or more, except for its ``correction_compliance``.
+    """Write to island.correction (n,) the normal impulses of position correction, kg m or kg m^2.
+    They move the gap of each contact by the ``correction`` of its member, m or rad, or more, by
+    complementarity; its ``correction_compliance`` is added to W as a share of the diagonal.
 
     W and the members are overwritten: only the normal rows remain.
     """
@@ -171,7 +176,9 @@ def scale_to_no_work(p: np.ndarray, n: int, work: float, spent: float) -> None:
 
 @compiled
 def energy_bound_share(a: float, b: float, c: float) -> float:
-    """Share x, from 0 to 1, up to which a x^2 + b x + c, J, is not positive; c is not."""
+    """Return the largest x from 0 to 1 with a x^2 + b x + c <= 0, J, for a >= 0; 1 if a = 0. A
+    positive c counts as 0.
+    """
     c = min(0.0, c)
     root = math.sqrt(max(0.0, b * b - 4 * a * c))
     share = (-2 * c / (b + root) if b > 0 else (root - b) / (2 * a)) if a > 0 else 1.0

@@ -104,8 +104,8 @@ def connect_bodies(s: System, ws: Workspace, m: int) -> int:
 
 @compiled
 def list_occurrences(island: Island, dofs: int, m: int) -> None:
-    """Write to island.occurrences the members whose support has each degree of freedom, and its
-    place there.
+    """List, for each degree of freedom in order of elimination, the members whose support contains
+    it and its place there: island.occurrences and occurrence_start.
     """
     begin, listed, sets = island.occurrence_start, island.occurrences, island.lu.sets
     for i in range(dofs + 1):
@@ -127,7 +127,9 @@ def list_occurrences(island: Island, dofs: int, m: int) -> None:
 
 @compiled
 def write_velocities(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> None:
-    """Write z = Y^T p to island.z and the velocities W p + b to island.velocity."""
+    """Write z = Y^T p to island.z and the row velocities W p + b to island.velocity; W includes the
+    compliance of the members.
+    """
     island = ws.island
     Y, z, u = island.Y, island.z, island.velocity
     for j in range(len(z)):
@@ -152,8 +154,9 @@ def write_velocities(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> Non
 
 @compiled
 def linearize_contact(island: Island, k: int, p: np.ndarray) -> float:
-    """Write phi of member k, scaled to velocities, to island.phi[k], and A and B of its
-    linearization to island.A[k] and island.B[k]. Returns the largest entry of phi.
+    """Linearize member k at p and island.velocity: write phi, scaled to velocities, to
+    island.phi[k], and A and B of A dp + B du = -phi to island.A[k] and island.B[k]. Returns the
+    largest absolute entry of phi, m/s.
     """
     member, block, u = island.members[k], island.blocks[k], island.velocity
     A, B, phi, a = island.A[k], island.B[k], island.phi[k], member.row
@@ -195,8 +198,10 @@ def linearize_contact(island: Island, k: int, p: np.ndarray) -> float:
 
 @compiled
 def eliminate_contact(island: Island, k: int, proximal: float) -> None:
-    """Replace B of member k by C^-1 B and phi by C^-1 phi; C, in island.A[k], has its pivots on the
-    diagonal: entries right of it are between the two rows of a sliding direction alone.
+    """Form C = A + B D of member k in island.A[k], and replace B by C^-1 B and phi by C^-1 phi. D
+    is diagonal: the member's compliance, and the share ``proximal`` of W's diagonal. Elimination
+    overwrites C. No pivoting: right of its diagonal, C has entries only between the two rows of
+    friction, or of rolling, that slides.
     """
     A, B, phi, kind = island.A[k], island.B[k], island.phi[k], island.members[k].kind
     soft = island.members[k].compliance
@@ -225,8 +230,8 @@ def eliminate_contact(island: Island, k: int, proximal: float) -> None:
 
 @compiled
 def multiply_rows(island: Island, k: int) -> None:
-    """Write B Y of member k, after eliminate_contact(), to its rows of island.BY, and whether they
-    are not zero, as those of open contacts are, to island.coupled.
+    """Write B Y of member k to its rows of island.BY, after eliminate_contact(), when B is C^-1 B.
+    Write to island.coupled which of these rows are not zero; those of open contacts are zero.
     """
     member, B, Y, BY = island.members[k], island.B[k], island.Y, island.BY
     for e in range(member.kind):
@@ -244,9 +249,9 @@ def multiply_rows(island: Island, k: int) -> None:
 
 @compiled
 def solve_for_dz(island: Island, dofs: int) -> bool:
-    """Assemble the matrix of the module's head, after multiply_rows() of all members, and solve for
-    the step dz = Y^T dp: island.z_direction, in order of elimination. Returns whether it is
-    regular.
+    """Assemble I + sum of Y^T C^-1 B Y, after multiply_rows() of all members, and solve for the
+    step dz = Y^T dp. Writes dz to island.z_direction, in order of elimination. Returns whether the
+    matrix is regular.
     """
     lu, Y, dz = island.lu, island.Y, island.z_direction
     for i in range(dofs):
@@ -266,7 +271,9 @@ def solve_for_dz(island: Island, dofs: int) -> bool:
 
 @compiled
 def add_contact_row(island: Island, k: int, x: int) -> None:
-    """Add to lu.row what member k contributes to the row of its degree of freedom x."""
+    """Add Y^T C^-1 B Y of member k to lu.row, the matrix row of the degree of freedom at place x of
+    its support.
+    """
     member, Y, BY, place, row = island.members[k], island.Y, island.BY, island.lu.sets, (
         island.lu.row)
     a, coupled, alone = member.row, island.coupled, 0
@@ -285,8 +292,8 @@ def add_contact_row(island: Island, k: int, x: int) -> None:
 
 @compiled
 def find_direction(island: Island, m: int) -> None:
-    """Write dp = -C^-1 (phi + B Y dz) to island.direction. island.phi and island.B have been
-    multiplied by C^-1, multiply_rows(); dz: island.z_direction, in the order of elimination.
+    """Write dp = -C^-1 (phi + B Y dz) to island.direction. island.phi and island.B already contain
+    the factor C^-1, by eliminate_contact(); dz: island.z_direction, in the order of elimination.
     """
     for k in range(m):
         member, B, phi = island.members[k], island.B[k], island.phi[k]
@@ -317,8 +324,9 @@ def linearize(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> tuple[floa
 @compiled
 def take_step(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
               most: float) -> tuple[float, float]:
-    """Move p along island.direction by the first of HALVED_SHARES that leaves phi's sum of squares
-    below ``most``, or the last. Returns what linearize() does there.
+    """Move p along island.direction by the first of the shares 1, 1/2, 1/4 ..., HALVED_SHARES in
+    number, that leaves phi's sum of squares below ``most``, or by the last. Returns the largest
+    entry of phi, m/s, and its sum of squares there, see linearize().
     """
     start, direction, share = ws.island.step_start, ws.island.direction, 1.0
     worst = total = 0.0
@@ -338,11 +346,12 @@ def take_step(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
 def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
                   dofs: int) -> float:
     """Solve a large island of m contacts and n rows for its impulses p (n,), N s: at most
-    SPARSE_STEPS Newton steps from the given p, until the residual is at most ``tolerance``, m/s. p
-    becomes the best found.
+    SPARSE_STEPS Newton steps from the given p, until the residual is at most ``tolerance``, m/s, or
+    stalls (SPARSE_PATIENCE). p becomes the best iterate, clamped to its cones.
 
     b (n,): velocities of the rows without impulses, m/s. ``dofs``: number of degrees of freedom,
-    from find_sparsity(). Writes Y^T p to island.z. Returns the residual of the best p, m/s.
+    from find_sparsity(). Writes Y^T p to island.z. Returns the residual of the best iterate before
+    clamping, m/s.
     """
     island, keep = ws.island, ws.island.best
     best, late, proximal, before = math.inf, 0, MOST_PROXIMAL, math.inf
@@ -370,14 +379,16 @@ def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, t
     for i in range(n):
         p[i] = keep[i]
     for k in range(m):
-        project_member(island, k, p)
+        clamp_member(island, k, p)
     write_velocities(ws, m, b, p)
     return best
 
 
 @compiled
-def project_member(island: Island, k: int, p: np.ndarray) -> None:
-    """Project the impulses of member k to its friction cone."""
+def clamp_member(island: Island, k: int, p: np.ndarray) -> None:
+    """Clamp the impulses of member k as clamp_to_cones() does: the normal one to at least zero,
+    then friction and rolling to their discs.
+    """
     member = island.members[k]
     a = member.row
     p[a] = max(0.0, p[a])

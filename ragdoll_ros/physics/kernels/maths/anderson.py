@@ -39,8 +39,9 @@ def make_anderson(rows: int, nv: int) -> Anderson:
 @compiled
 def accelerate(memory: Anderson, weights: np.ndarray, n: int, turn: int, p: np.ndarray,
                z: np.ndarray) -> None:
-    """Move the impulses p (n,), with z = Y^T p, from where sweep number ``turn`` has brought them
-    to where the next one begins. ``weights`` (n,): roots of W's diagonal.
+    """Replace the impulses p (n,) and z = Y^T p after sweep number ``turn`` by those at which the
+    next sweep begins. memory.start must hold p before the sweep; turn 0 forgets earlier sweeps.
+    ``weights`` (n,): roots of W's diagonal.
     """
     f, swept, z_swept = memory.f, memory.swept, memory.z_swept
     slot, count = turn % MEMORY, min(turn, MEMORY)

@@ -22,7 +22,7 @@ list of some nodes; their ``order``."""
 
 
 def make_minimum_degree(nodes: int) -> MinimumDegree:
-    """Allocate room for so many nodes, or for MOST_NODES."""
+    """Allocate room for ``nodes`` nodes, at most MOST_NODES."""
     room = min(nodes, MOST_NODES)
     return MinimumDegree(np.zeros((room, room), np.uint8),
                          *(np.zeros(room, np.int64) for _ in range(4)))

@@ -51,7 +51,9 @@ def oscillator_response(w: float, c: float, h: float) -> tuple[float, float, flo
 
 @compiled
 def _series(product: float, total: float) -> tuple[float, float, float]:
-    """Sum h_k/(k+1)!, h_k/(k+2)!, h_k/(k+3)!; h_k the complete symmetric polynomials of a, b."""
+    """Return the sums over k of h_k/(k+1)!, h_k/(k+2)!, h_k/(k+3)!; h_k the complete symmetric
+    polynomials of a, b, where a b = ``product`` and a + b = -``total``.
+    """
     before, term = 0.0, 1.0
     m, n1, n3 = 0.0, 0.0, 0.0
     factorial = 1.0
@@ -86,8 +88,9 @@ def _phi2(x: float) -> float:
        *[type_like(np.zeros((0, 0)))] * 2)
 def drive_oscillators(w: float, c: float, h: float, forces: np.ndarray, z: np.ndarray,
                       rate: np.ndarray, z_path: np.ndarray, rate_path: np.ndarray) -> None:
-    """Advance ``z`` and z', ``rate`` (k,), of equal oscillators by t steps of ``h`` s in which
-    ``forces`` (t, k) are constant; write those at the end of each to the paths (t, k).
+    """Advance oscillators z'' = -w z - c z' + f with equal w, 1/s^2, and c, 1/s, by t steps of
+    ``h`` s in which their ``forces`` f (t, k) are constant. Updates ``z`` and ``rate``, z', (k,) in
+    place and writes their values at the end of each step to the paths (t, k).
     """
     m, n1, _ = oscillator_response(w, c, h)
     for i in range(len(forces)):

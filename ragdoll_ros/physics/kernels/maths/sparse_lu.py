@@ -31,7 +31,7 @@ are lists: cliques by their first index, children by their parent in the elimina
 
 def make_sparse_lu(n: int, sets: int, size: int) -> SparseLU:
     """Allocate an LU factor of n rows, of up to ``sets`` cliques of up to ``size`` indices each,
-    with room for n min(n, ROOM) entries.
+    with room for n min(n, ROOM) entries of U.
     """
     room = n * min(n, ROOM)
 

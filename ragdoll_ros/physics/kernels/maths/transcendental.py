@@ -22,8 +22,8 @@ C4, C6, C8, C10, C12, C14, C16, C18 = ((-1) ** k / math.factorial(2 * k) for k i
 
 
 def _node(place: float) -> tuple[float, float, float]:
-    """Angle, sine and cosine of the direction (1 - place, 1 - |1 - place|), rounded correctly, so
-    the same on all machines.
+    """Return angle, sine and cosine of the direction (1 - place, 1 - |1 - place|), 0 <= place < 2,
+    rounded correctly, so the same on all machines.
     """
     with localcontext() as context:
         context.prec = 40
@@ -51,7 +51,9 @@ LN2_HIGH, LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
 
 @compiled
 def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Sine and cosine of an angle, rad; error 3e-16, past a million turns the angle's own."""
+    """Return sine and cosine of an angle, rad. Error 3e-16; past a million turns it is that of
+    rounding the angle itself.
+    """
     if abs(angle) < math.pi / 4:
         return series(angle)
     quarters = math.floor(angle * (2 / math.pi) + 0.5)
@@ -78,8 +80,8 @@ def series(x: float) -> tuple[float, float]:
 
 @compiled
 def asinh(x: float) -> float:
-    """Inverse hyperbolic sine: halved till the series is short, by sinh(a) = 2 sinh(a/2)
-    sqrt(1 + sinh(a/2)^2).
+    """Return the inverse hyperbolic sine of x: the result is halved until a short series suffices,
+    by sinh(a) = 2 sinh(a/2) sqrt(1 + sinh(a/2)^2).
     """
     share = 1.0
     while abs(x) > 0.05:

@@ -110,7 +110,7 @@ def to_local(r: np.ndarray, a: Vec3) -> Vec3:
 
 @compiled
 def quat_mul(p: Quat, q: Quat) -> Quat:
-    """Hamilton product p q: the rotation q followed by p."""
+    """Return the Hamilton product p q, components x, y, z, w: the rotation q followed by p."""
     return (p[3] * q[0] + p[0] * q[3] + p[1] * q[2] - p[2] * q[1],
             p[3] * q[1] - p[0] * q[2] + p[1] * q[3] + p[2] * q[0],
             p[3] * q[2] + p[0] * q[1] - p[1] * q[0] + p[2] * q[3],

@@ -48,9 +48,10 @@ STEADY = 1.0
 
 @compiled
 def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
-    """Write the contacts that touch by ws.gaps, with their velocities, to contacts.start, their
-    number and the load potential to step.scalars, and step.sums_before; give points of pairs that
-    touch their gaps. Overwrites step.start.
+    """Prepare a step from cluster.q and v. Write the contacts that touch by ws.gaps, with their
+    velocities, to contacts.start, their number and the load potential to step.scalars, and
+    step.sums_before. The manifold points of touching pairs get gaps of their own in ws.gaps, see
+    track_points(). step.start becomes the kinematics of q and v. Overwrites contacts.found.
     """
     q, v, kin, scalars = cluster.q, cluster.v, ws.step.start, ws.step.scalars[0]
     forward_kinematics(s.tree, q, v, kin)
@@ -67,8 +68,8 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
-    """Whether a contact of contacts.start, the start of a step, closes so fast that it is an
-    impact, and had no part in the impact that ended the last step; False if none ended that.
+    """Whether an impact is due before the step: a contact of contacts.start closes fast, and was
+    not one that had_met() in the last step. False if the last step ended without an impact.
     """
     if ws.stats[0].ended_without_impact:
         return False
@@ -82,10 +83,10 @@ def approaches_fast(s: System, ws: Workspace, cluster: ClusterState) -> bool:
 
 @compiled
 def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float) -> int:
-    """Compute one step of h s, after begin_contact_step(): step.q_end, before position correction
-    but clipped to joint limits, step.v_end, step.correction with its energy, and contacts.found
-    with their impulses; cluster.contact_accelerations are 0 unless all contacts persist. Returns
-    the number of contacts.
+    """Compute one step of h s, after begin_contact_step(). Writes step.q_end, without position
+    correction; step.v_end; step.correction, scaled by clip_to_joint_limits(), and its energy;
+    contacts.found with their impulses; and cluster.contact_accelerations, 0 unless there are
+    contacts and all_persist(). Returns the number of contacts.
 
     ``since``: time, s, since the targets of springs were at spring.target.
     """
@@ -134,7 +135,10 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
 
 @compiled
 def all_persist(ws: Workspace, m: int, h: float) -> bool:
-    """Whether all m contacts of a step of h s existed before, and neither closed nor opened."""
+    """Whether all m contacts of a step of h s are persistent and steady as it begins: their normal
+    velocity is at most STEADY h in size; where friction has no limit, the tangential ones as
+    well.
+    """
     for i in range(m):
         c = ws.contacts.found[i]
         if not c.persistent or abs(c.start_velocity[0]) > STEADY * h:
@@ -149,11 +153,13 @@ def all_persist(ws: Workspace, m: int, h: float) -> bool:
 def unconstrained_velocity(s: System, ws: Workspace, cluster: ClusterState, h: float,
                            time: float) -> None:
     """Write to step.v_free (nv,) the velocities after h s without contacts, and to dynamics.H the
-    factor of the mass matrix with implicit terms. step.middle is that of step.q_middle and v.
+    factor of the mass matrix with implicit terms. Requires step.middle to be of step.q_middle and
+    v; its velocities are overwritten.
 
-    Forces are evaluated twice: at v, and at the velocities of the step's middle that this leads to,
-    with contact_accelerations for the contacts. ``time``: s since the springs' targets were at
-    spring.target.
+    Bias forces are evaluated twice: at v, and at the velocities of the step's middle that follow,
+    with half the change by contact_accelerations. Springs and damping are evaluated at v; their
+    change is implicit. If springs saturate, this is done again with their largest forces. ``time``:
+    s since the springs' targets were at spring.target.
     """
     v, springs, step, kin, dyn = cluster.v, cluster.springs, ws.step, ws.step.middle, (
         ws.step.dynamics)

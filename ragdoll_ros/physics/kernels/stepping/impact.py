@@ -37,9 +37,10 @@ def closes_fast(c: np.record) -> bool:
 @compiled
 def keep_impacting(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m: int,
              landed: float) -> int:
-    """Keep, in contacts.found, those of its first m contacts that an impact at cluster.q solves:
-    with a gap up to MET, those that had_met() in the last step, and those that close fast with a
-    gap up to ``landed``, m or rad. Returns their number.
+    """Select the contacts that an impact at cluster.q solves, from the first m of contacts.found,
+    and move them to its beginning: those with a gap up to MET; those that had_met() in the last
+    step; those that close fast and have a gap up to ``landed``, m or rad. Returns their number.
+    ``kin``: of cluster.q and v.
     """
     contacts, known, count = ws.contacts.found, ws.stats[0].contact_count, 0
     for i in range(m):
@@ -55,9 +56,10 @@ def keep_impacting(s: System, ws: Workspace, cluster: ClusterState, kin: Kinemat
 
 @compiled
 def follow_twist(s: System, ws: Workspace, cluster: ClusterState) -> None:
-    """Where a kinematic body has another velocity than in the last step, let what touches it follow
-    at once, without restitution: its velocity is a sample of a motion that is none of impacts.
-    ws.gaps are current.
+    """If a kinematic body has changed its velocity since the last step (stats.twist_changed), solve
+    an impact without restitution, so that what touches the body follows at once, and clear the
+    flag. Such a velocity samples a smooth motion: its changes are no impacts. ws.gaps are
+    current.
     """
     if ws.stats[0].twist_changed:
         impact(s, ws, cluster, 0.0, math.inf)
@@ -66,9 +68,11 @@ def follow_twist(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def impact(s: System, ws: Workspace, cluster: ClusterState, time: float, landed: float) -> int:
-    """Add to cluster.v the change by the impulses of everything that has met at q by ws.gaps, and
-    log what met, ``time`` s after the beginning of the advance, where a log is kept. Returns how
-    many contacts that touch were left out. ``landed``: see keep_impacting().
+    """Solve an impact of those contacts at cluster.q, found by ws.gaps, that keep_impacting()
+    selects: add the change of velocity to cluster.v, and log the impacts, where a log is kept, at
+    ``time`` s after the beginning of the advance. If stats.twist_changed is set, there is no
+    restitution and nothing is logged, see follow_twist(). Returns the number of touching contacts
+    that were not selected. ``landed``: see keep_impacting().
     """
     q, v, kin, dyn, contacts = (cluster.q, cluster.v, ws.step.start, ws.step.dynamics,
                                 ws.contacts.found)

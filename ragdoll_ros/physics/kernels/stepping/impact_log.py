@@ -35,9 +35,10 @@ def log_impacts(s: System, ws: Workspace, cluster: ClusterState, m: int, in_step
     the patch closed faster than ``slowest``, m/s; joint limits are not logged. ``time``: s since
     the advance began. cluster.impact_count also counts those that do not fit in the log.
 
-    Call it after solve_contacts() of an impact, or, ``in_step``, of a step that does not seek
-    impacts: then persistent contacts are not logged, and their normal impulses in contacts.found
-    become zero. Contacts of a patch are merged there.
+    Call it after solve_contacts() of an impact, or, with ``in_step``, of a step that does not seek
+    impacts: then persistent contacts are not logged. Overwrites contacts.found: merge_patch()
+    merges the contacts of each patch, and ``in_step`` sets the normal impulses of persistent
+    contacts to zero.
     """
     kin, q = ws.step.start, cluster.q
     if in_step:
@@ -83,8 +84,10 @@ def merge_patch(found: np.ndarray, begin: int, end: int) -> None:
 @compiled
 def write_mobilities(s: System, ws: Workspace, q: np.ndarray, kin: Kinematics, c: np.record,
                      entry: np.record) -> None:
-    """Write the effective mass of contact c along its normal, and the mobilities of its bodies'
-    centers of mass, to its entry in the log.
+    """Write to the ``entry`` of contact c in the log its effective mass along the normal, kg, and
+    its mobilities: the speed of each body's center of mass per unit normal impulse, 1/kg.
+    entry.body_a and body_b must be set; dynamics.H is the factor of the mass matrix. Overwrites
+    c.friction_point, the row fields of c and rows of island.Y.
     """
     island, point = ws.island, vec(c.point)
     for side in range(2):
@@ -115,8 +118,10 @@ def write_mobilities(s: System, ws: Workspace, q: np.ndarray, kin: Kinematics, c
 @compiled
 def write_rows(s: System, ws: Workspace, q: np.ndarray, kin: Kinematics, c: np.record, row: int,
                index: int, body_a: int, body_b: int, point: Vec3) -> None:
-    """Write J L^-1 of the velocity of body_a against body_b at ``point``, m, along normal and
-    tangents of c, to island.Y from ``row`` on, and its columns to island.support[index].
+    """Write the rows J L^-1 of the velocity of body_a relative to body_b at ``point``, m, along the
+    normal and tangents of c, and those of rolling if c has them, to island.Y from ``row`` on. Write
+    the degrees of freedom of their columns to island.support[index], and the column of each to
+    island.place. dynamics.H is L. Overwrites the bodies, points, first_row and dof_count of c.
     """
     c.first_row, c.body_a, c.body_b = row, body_a, body_b
     put(c.point, point)

@@ -35,8 +35,9 @@ ROUNDING = 1e-6
 
 @compiled
 def local_error(cluster: ClusterState, v_end: np.ndarray, h: float) -> float:
-    """Estimated error, m or rad, of the coordinates after the step of h s just taken, by the change
-    of the mean acceleration since the step before. Infinite where there is none.
+    """Estimate the error, m or rad, of the coordinates after the step of h s just taken, from the
+    change of the mean acceleration since the step before; infinite if that acceleration is
+    unknown.
     """
     before, change = cluster.stats[0].acceleration_dt, 0.0
     if before == 0:
@@ -48,8 +49,8 @@ def local_error(cluster: ClusterState, v_end: np.ndarray, h: float) -> float:
 
 @compiled
 def allowed_error(nominal: float) -> float:
-    """Largest local error, m or rad, of a step that is longer than the nominal one of ``nominal``
-    s.
+    """Largest local error, m or rad, allowed in a step longer than ``nominal`` s: that of a nominal
+    step in which the acceleration changes by QUIET.
     """
     return nominal * nominal / 12 * QUIET
 
@@ -69,7 +70,10 @@ def is_too_long(cluster: ClusterState, v_end: np.ndarray, h: float, nominal: flo
 
 @compiled
 def set_smooth_dt(cluster: ClusterState, v_end: np.ndarray, h: float, nominal: float) -> None:
-    """Write stats.smooth_dt, as the step of h s just taken allows, and its mean accelerations."""
+    """Write stats.smooth_dt, s: the length above ``nominal`` that error and speed of the step of h
+    s just taken allow the next one, else 0. Store the mean accelerations of the step in the
+    cluster.
+    """
     stats, error, allowed = cluster.stats[0], local_error(cluster, v_end, h), allowed_error(nominal)
     longer, speed = 0.0, 0.0
     if error <= allowed:
@@ -89,5 +93,7 @@ def set_smooth_dt(cluster: ClusterState, v_end: np.ndarray, h: float, nominal: f
 
 @compiled
 def forget_accelerations(cluster: ClusterState) -> None:
-    """After an impact or a flight nothing is known of the accelerations in the next step."""
+    """Mark the last accelerations as unknown, after an impact or a flight: set
+    stats.acceleration_dt and stats.smooth_dt to 0.
+    """
     cluster.stats[0].acceleration_dt = cluster.stats[0].smooth_dt = 0.0

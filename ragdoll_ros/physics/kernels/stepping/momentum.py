@@ -30,8 +30,9 @@ REMOVABLE = 0.01
 
 @compiled
 def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.ndarray) -> None:
-    """Write the sums over each doll to ``out`` (d,); ``kin``: of q, its inertias are updated. What
-    moves a doll that is MOVED keeps its energy, which counts as zero.
+    """Write the sums over each doll (DOLL_SUMS) to ``out`` (d,). ``kin``: of q and the velocities;
+    its inertias are updated. The energies of a doll that is MOVED count as zero, as its motion is
+    prescribed. Overwrites dynamics.matrix.
     """
     rotate_inertias(s.tree, kin, ws.step.dynamics.matrix)
     for d in range(len(out)):
@@ -104,15 +105,18 @@ def add_impulse(external: np.record, factor: float, at: Vec3, impulse: Vec3) -> 
 
 @compiled
 def is_borne(s: System, c: np.record) -> bool:
-    """Whether one side of a contact does not yield: the WORLD, or a kinematic body."""
+    """Whether one side of a contact does not yield: the WORLD or a kinematic body. True for joint
+    limits, whose body_b is the WORLD.
+    """
     return c.body_b < 0 or s.tree[c.body_a].kinematic != 0 or s.tree[c.body_b].kinematic != 0
 
 
 @compiled
 def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
-    """Of m contacts, add the impulses of those between dolls to step.external, moments about the
-    world's origin, and set its flags: which dolls the ground bears, or a kinematic body (a contact
-    with an impulse), and which touch another.
+    """Add the impulses of m contacts between two dolls to step.external, with moments about the
+    world's origin. Set its flags: on_ground for dolls with an impulse from the WORLD or a kinematic
+    body, touches_other for dolls that have a contact with another. Contacts with a kinematic body
+    set on_ground alone. Joint limits and contacts within a doll are skipped.
     """
     external = ws.step.external
     for n in range(m):
@@ -142,7 +146,9 @@ def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
 
 @compiled
 def count_contact_impulses(s: System, ws: Workspace, m: int, impulses: np.ndarray) -> None:
-    """Add the impulses of m contacts to those on their bones, ``impulses`` (n, 3) N s."""
+    """Add the impulses of m contacts to ``impulses`` (n, 3) N s, by bone, world frame: with plus
+    sign for body_a, minus for body_b. Joint limits are skipped.
+    """
     for n in range(m):
         c = ws.contacts.found[n]
         if c.kind == LIMIT:
@@ -158,14 +164,14 @@ def count_contact_impulses(s: System, ws: Workspace, m: int, impulses: np.ndarra
 
 @compiled
 def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Change q and v at the end of a step of h s, where the sums are step.sums_after, so that each
-    doll that is not on the ground has the momentum and center of mass that its external impulses
-    give it.
+    """Change the coordinates q and velocities v of roots at the end of a step of h s, so that each
+    doll that is not on the ground has the momenta and center of mass that follow from its external
+    impulses. The sums at q are step.sums_after.
 
-    Position correction may have moved dolls apart that touch each other. In an island in the air
-    it must not move the common center of mass: that displacement is taken from all dolls alike.
-    Then their spins make up for what it changes of the angular momentum, with velocities relative
-    to that center.
+    Displacements by position correction between touching dolls are kept. In an island in the air
+    they must not move the common center of mass: its displacement is subtracted from that of each
+    doll. What is left of a doll's displacement adds angular momentum about the common center, by
+    the doll's velocity relative to that center; the doll's spin compensates it.
     """
     step, label = ws.step, ws.island.label
     sum_islands(s, ws, h)
@@ -211,7 +217,10 @@ def due_momentum(s: System, ws: Workspace, d: int, h: float) -> Vec3:
 
 @compiled
 def sum_islands(s: System, ws: Workspace, h: float) -> None:
-    """Write step.islands, the sums over the dolls of each island that touch others, after h s."""
+    """Write step.islands: sums over those dolls of each island that touch other dolls, of mass, of
+    momentum after h s and of mass times displacement by position correction, and whether the ground
+    bears one of these dolls.
+    """
     islands, label = ws.step.islands, ws.island.label
     for d in range(len(islands)):
         group = islands[d]

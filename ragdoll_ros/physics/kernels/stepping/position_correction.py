@@ -65,8 +65,8 @@ def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.nda
 def write_correction_motion(s: System, kin: Kinematics, q: np.ndarray, correction: np.ndarray,
                             motion: np.ndarray) -> None:
     """Write how far a displacement ``correction`` (nv,) moves each body, for the update of gaps:
-    its center of mass, m, to motion[i].correction, its angle of rotation, rad, to correction_angle.
-    ``kin`` is that of q; its velocities are overwritten.
+    the distance that its center of mass moves, m, to motion[i].correction, and its angle of
+    rotation, rad, to motion[i].correction_angle. ``kin``: of q; its velocities are overwritten.
     """
     some = False
     for j in range(len(correction)):

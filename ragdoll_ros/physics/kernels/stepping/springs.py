@@ -14,17 +14,18 @@ from ..system import System
 
 @compiled
 def theta_weight(rate: float) -> float:
-    """Share of a step at which damping with decay ``rate`` (per step) is evaluated: its middle,
-    later where it is stiff (Liniger and Willoughby, SIAM J. Numer. Anal. 7, 1970).
+    """Weight of the velocity at a step's end in damping that decays by ``rate`` per step: 1/2, or 1
+    - 1/rate where the damping is stiff, rate > 2 (Liniger and Willoughby, SIAM J. Numer. Anal. 7,
+    1970).
     """
     return max(0.5, 1 - 1 / rate) if rate > 0 else 0.5
 
 
 @compiled
 def implicit_damping(spring: np.record, h: float) -> float:
-    """Minus the derivative of a spring's mean force over a step of h s by the velocity at its end,
-    N s/m; of torques N m s/rad. 0 of a saturated spring. Damping counts a half for a grab, else by
-    theta_weight().
+    """Minus the derivative of a spring's mean force in a step of h s with respect to the velocity
+    at its end, N s/m; for torques N m s/rad. It is stiffness h/4 plus damping times 1/2 for a grab,
+    times theta_weight(h damping mobility) for others; 0 for a saturated spring.
     """
     if spring.saturated:
         return 0.0
@@ -137,12 +138,13 @@ def mean_spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, 
 @compiled
 def saturate_springs(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, v_free: np.ndarray,
                      springs: np.ndarray, time: float, h: float) -> bool:
-    """Write saturated_force, and ``saturated`` 1, to springs whose mean force from v to ``v_free``
-    would exceed max_force. Returns whether there are any. ``kin``, q, ``time``: of the middle.
+    """Set ``saturated`` to 1 and write saturated_force, of size max_force, for springs whose mean
+    force from v to ``v_free`` exceeds max_force. Returns whether there are any. ``kin``, q,
+    ``time``: of the middle.
 
-    The force has the direction of that at v: the mean of a force without limit, far from its
-    target, turns within the step. Of a joint spring, and where that at v is zero, it has that of
-    the mean.
+    The force has the direction of the spring's force at v, because the mean force without limit,
+    far from the target, turns within the step. For a joint spring, and where the force at v is
+    zero, it has the direction of the mean force.
     """
     some = False
     for k in range(len(springs)):

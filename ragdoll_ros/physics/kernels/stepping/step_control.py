@@ -61,15 +61,15 @@ trial on. Those that do not close in it have no effect."""
 @compiled
 def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float,
                    nominal: float, seek: bool) -> tuple[float, bool]:
-    """Advance by at most h s after begin_contact_step(), stopping at the first fast impact. Returns
-    the time advanced and whether an impact was reached.
+    """Advance by at most h s after begin_contact_step(); if ``seek``, stop at the first fast
+    impact. Returns the time advanced and whether an impact was reached.
 
     ws.gaps are those at cluster.q before and after. A step that adds much energy or penetration is
-    repeated at half the length; the little energy that others add is removed from the motion. Where
-    impacts are not to ``seek``, gaps that close in the step become contacts, with restitution, and
-    it is repeated.
+    repeated with a shorter length, see shorter_length(). An energy gain that is left, if small or
+    above tolerated_energy_gain(), is removed from the motion. Without ``seek``, gaps that close in
+    the step become contacts, with restitution, and the step is repeated.
 
-    ``nominal``: s of a step where nothing shortens it; ``since``: see contact_step().
+    ``nominal``: nominal length of a step, s; ``since``: see contact_step().
     """
     step, stats, ledger = ws.step, ws.stats[0], ws.stats[0].ledger
     length, hit, m = min(h, stats.next_dt) if stats.next_dt > 0 else h, False, 0
@@ -137,11 +137,12 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
 @compiled
 def shorter_length(s: System, ws: Workspace, length: float, nominal: float, too_coarse: bool,
                    gains: bool) -> float:
-    """Length, s, at which the step of ``length`` s just taken is to be repeated; 0 if it is not.
+    """Length, s, at which the step of ``length`` s just taken is to be repeated; 0 to accept it.
 
-    The nominal one, if it is longer and ``too_coarse``; half of it, if it ``gains`` energy or
-    penetrates further; where impacts are not sought, the share of it after which no gap is too deep
-    that closed unseen. Counts the reason in stats.ledger.
+    If the step is ``too_coarse``: ``nominal``. Else, if it ``gains`` energy or penetrates further,
+    and is longer than FINEST nominal: half of ``length``. Else, where impacts are not sought and it
+    is longer than COARSEST nominal: ``length`` times unseen_share(), if that is below 1, but at
+    least COARSEST nominal. Counts the reason in stats.ledger.
     """
     ledger = ws.stats[0].ledger
     if too_coarse:
@@ -165,18 +166,20 @@ def shorter_length(s: System, ws: Workspace, length: float, nominal: float, too_
 @compiled
 def begin_trials(s: System, ws: Workspace, cluster: ClusterState, h: float,
                  nominal: float) -> float:
-    """Copy ws.gaps to contacts.gaps_active and open the bracket of the time of impact. Returns the
-    length of the first trial, at most h s; see predict_contacts().
+    """Copy ws.gaps to contacts.gaps_active and reset the bracket of the time of impact. Returns the
+    length of the first trial, at most h s. Where impacts are not sought, it is limited by
+    predict_gaps(), and gaps that are below SPECULATIVE or would close within twice that length
+    become contacts in gaps_active.
     """
     copy_into(ws.contacts.gaps_active, ws.gaps)
     open_bracket(ws)
     ws.step.scalars[0].tried_count = 0
     if ws.step.scalars[0].seeks_impacts:
         return h
-    share = predict_contacts(s, ws, cluster, h, nominal)
+    share = predict_gaps(s, ws, cluster, h, nominal)
     if share < 1 and h > COARSEST * nominal:
         h = max(share * h, COARSEST * nominal)
-        predict_contacts(s, ws, cluster, h, nominal)
+        predict_gaps(s, ws, cluster, h, nominal)
     touching = ws.step.scalars[0].touching
     for j in range(ws.gap_counts[0].live):
         if ws.contacts.gaps_end[j] < ws.gaps[j] - ws.contacts.gaps_end[j] or (
@@ -186,10 +189,11 @@ def begin_trials(s: System, ws: Workspace, cluster: ClusterState, h: float,
 
 
 @compiled
-def predict_contacts(s: System, ws: Workspace, cluster: ClusterState, h: float,
-                     nominal: float) -> float:
+def predict_gaps(s: System, ws: Workspace, cluster: ClusterState, h: float,
+                 nominal: float) -> float:
     """Write the gaps after h s at the velocities of the start to contacts.gaps_end. Returns the
-    share of h after which none is too deep, by unseen_share().
+    share of h after which none is too deep, by unseen_share(). Overwrites step.q_end and
+    step.end.
     """
     step, q, v = ws.step, cluster.q, cluster.v
     integrate_positions(s.tree, q, v, h, step.q_end)
@@ -224,8 +228,9 @@ def clear_contact_accelerations(cluster: ClusterState) -> None:
 
 @compiled
 def unseen_share(s: System, ws: Workspace, max_depth: float) -> float:
-    """Share of the step just taken after which no gap that was open as it began is below minus
-    ``max_depth``, m, or UNSEEN_TURN, if all close evenly; 1 if none is at its end.
+    """Share of the step just taken, times SAFETY, after which no gap is deeper than ``max_depth``,
+    m, or UNSEEN_TURN, if all close evenly; 1 if none is deeper at the step's end. Only gaps count
+    that are open by contacts.gaps_active: contacts of the step are excluded.
     """
     share, touching = 1.0, ws.step.scalars[0].touching
     for j in range(ws.gap_counts[0].live):
@@ -238,9 +243,10 @@ def unseen_share(s: System, ws: Workspace, max_depth: float) -> float:
 
 @compiled
 def activate_contacts(s: System, ws: Workspace, h: float) -> bool:
-    """If gaps closed in the step of h s just taken, overshot or fast, make them contacts of it, in
-    contacts.gaps_active, and those that at their mean rate would have closed in twice the time: the
-    impulses of the first will close some of them. Returns whether there are any.
+    """If an open gap is overshot at the end of the step of h s just taken, or is a fast impact,
+    make more gaps contacts in contacts.gaps_active, for the repetition of the step: all open gaps
+    that would close within 2 h at their mean rates, as the impulses of the first ones will close
+    some others. Returns whether a gap is overshot or a fast impact.
     """
     active, end, some = ws.contacts.gaps_active, ws.contacts.gaps_end, False
     touching = ws.step.scalars[0].touching
@@ -273,8 +279,10 @@ def copy_into(to: np.ndarray, values: np.ndarray) -> None:
 
 @compiled
 def tolerated_energy_gain(s: System, ws: Workspace, kinetic: float, work: float) -> float:
-    """Energy gain, J, tolerated in a step: a fraction of the kinetic energy, or, near rest, of
-    m g L, both up to a share of the internal kinetic energy.
+    """Energy gain, J, tolerated in a step: a fraction of the ``kinetic`` energy plus the size of
+    the ``work`` done; or, if that is more, a fraction of m g L, which counts up to PAID_SHARE of
+    the kinetic energy. At most a share of the internal kinetic energy. A fraction of m g L for
+    rounding, SOLVER_GAIN, is added to that.
     """
     share = max(KINETIC_GAIN * (kinetic + abs(work)),
                 min(PAID_SHARE * kinetic, RESTING_GAIN * s.energy_scale[0]))
@@ -285,7 +293,8 @@ def tolerated_energy_gain(s: System, ws: Workspace, kinetic: float, work: float)
 @compiled
 def solver_energy(s: System, ws: Workspace, m: int, h: float) -> float:
     """Energy, J, that the residual of the contact solve may add in a step of h s with m contacts,
-    which no shorter step would avoid: the residual times the sum of all impulses.
+    which no shorter step would avoid: the residual, at least ten times the tolerance of the solve,
+    times the sum of all impulses, at most jam_threshold().
     """
     total = 0.0
     for i in range(m):
@@ -298,7 +307,9 @@ def solver_energy(s: System, ws: Workspace, m: int, h: float) -> float:
 
 @compiled
 def any_closed(ws: Workspace) -> bool:
-    """Whether a gap that was open as the step just taken began is overshot at its end."""
+    """Whether a gap that was above scalars.touching as the step just taken began is below OVERSHOT
+    at its end.
+    """
     touching = ws.step.scalars[0].touching
     for j in range(ws.gap_counts[0].live):
         if ws.gaps[j] > touching and ws.contacts.gaps_end[j] < OVERSHOT:

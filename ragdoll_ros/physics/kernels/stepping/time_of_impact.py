@@ -4,9 +4,9 @@ Geoms that are apart when a step begins may meet before it ends. A length at whi
 and one at which something has bracket the time of impact, which is approached by regula falsi with
 Anderson and Bjoerck's weights (BIT 13, 1973), and by bisection where that lags, as between two gaps
 of which one is not straight. The first trial is the whole step, or ends where a joint would reach
-its limit at its present rate. The second ends at the root of the parabola through the gaps at the
-start, middle and end of the first. The loop that tries the lengths is
-step_control.step_to_impact(); in flight, flight/first_contact.py.
+its limit at its present rate. The second ends at the root of a parabola through the gaps at the
+start and end of the first, whose slope at the start is by the gaps at step.q_middle. The loop that
+tries the lengths is step_control.step_to_impact(); in flight, flight/first_contact.py.
 """
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ MAX_CHORDS = 2
 
 @compiled
 def is_fast_impact(s: System, ws: Workspace, j: int, h: float) -> bool:
-    """Whether gap j, open as the step of h s just taken began, touches at its end, and
-    closed at a mean rate above SLOW or SLOW_TURN.
+    """Whether gap j was above scalars.touching as the step of h s just taken began, is not above it
+    at the end, and closed at a mean rate above SLOW or SLOW_TURN.
     """
     slow = SLOW_TURN if is_joint_limit_gap(s, ws, j) else SLOW
     end, touching = ws.contacts.gaps_end[j], ws.step.scalars[0].touching
@@ -47,8 +47,10 @@ def is_fast_impact(s: System, ws: Workspace, j: int, h: float) -> bool:
 
 @compiled
 def impacts_at_end(s: System, ws: Workspace, h: float) -> tuple[bool, bool, bool]:
-    """Of the gaps that closed fast in the step of h s just taken, or whose time of impact is
-    sought: whether one is overshot at its end; whether one has landed; whether any closed fast.
+    """Return three flags of the step of h s just taken: whether a gap is overshot at its end (below
+    OVERSHOT), whether one has landed (up to LANDED), whether any is a fast impact. The first two
+    count fast impacts, and bracketed gaps (step.gaps_high < 0) that touch at the end. Bracketed
+    gaps that are not fast impacts have landed in any case.
     """
     overshot = landed = fast = False
     for j in range(ws.gap_counts[0].live):
@@ -62,7 +64,9 @@ def impacts_at_end(s: System, ws: Workspace, h: float) -> tuple[bool, bool, bool
 
 @compiled
 def open_bracket(ws: Workspace) -> None:
-    """Reset step.bracket: an impact is only known to be after the start."""
+    """Reset step.bracket to 0 and infinity, step.gaps_low to ws.gaps less AIM, and step.gaps_high
+    to EXCLUDED.
+    """
     bracket = ws.step.bracket[0]
     bracket.low, bracket.high, bracket.moved = 0.0, math.inf, 0
     bracket.halved_width, bracket.chords = math.inf, 0
@@ -72,14 +76,15 @@ def open_bracket(ws: Workspace) -> None:
 
 @compiled
 def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: bool) -> bool:
-    """Make a step of h s the high end of the bracket, if a gap at its end is ``overshot``, below
-    OVERSHOT, else its low end, unless a gap that closes fast has ``landed``, at LANDED or less:
-    then its impact is found. Returns whether to try another length: not where the bracket has no
-    high end, or is as short as SHORTEST, or the step itself is, or it is not above the low end.
+    """Update the bracket of the time of impact with a step of h s, see impacts_at_end(). If a gap
+    is ``overshot``, the step becomes the high end. Else it becomes the low end if no gap has
+    ``landed``, h is above the low end, and the high end is longer than h by more than SHORTEST.
+    Returns whether to try another length: of an overshot step, whether h is above SHORTEST; of
+    another, whether it became the low end and there is a high end.
 
-    Gaps are kept less AIM. At the high end only those count that are below OVERSHOT and either were
-    negative at the high end before or are fast impacts; the others are EXCLUDED. Those at an end
-    that stays twice are weighted: anderson_bjorck_weight().
+    Gaps are stored less AIM. At the high end only gaps count that are below OVERSHOT and either
+    were negative at the high end before or are fast impacts; the others are EXCLUDED. If the same
+    end moves twice in a row, the gaps at the other end are scaled by anderson_bjorck_weight().
     """
     bracket, low, high, end = (ws.step.bracket[0], ws.step.gaps_low, ws.step.gaps_high,
                                ws.contacts.gaps_end)
@@ -115,7 +120,9 @@ def anderson_bjorck_weight(before: float, now: float) -> float:
 
 @compiled
 def update_middle_gaps(s: System, ws: Workspace) -> None:
-    """Write to step.gaps_middle the bracketed gaps at the middle of the trial just made."""
+    """Write to step.gaps_middle the bracketed gaps (gaps_high < 0) at step.q_middle of the trial
+    just made, half its length on at the start's velocities. AIM is not subtracted.
+    """
     for j in range(ws.gap_counts[0].live):
         if ws.step.gaps_high[j] < 0:
             ws.step.gaps_middle[j] = middle_gap(s, ws, j)

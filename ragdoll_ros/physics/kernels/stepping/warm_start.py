@@ -21,7 +21,9 @@ JAMMED = 10.0
 
 @compiled
 def jam_threshold(s: System, ws: Workspace, h: float) -> float:
-    """Sum of impulses, N s, that only jammed contacts exceed in h s."""
+    """Sum of impulses, N s, that only jammed contacts exceed in h s: JAMMED times the sum over
+    dolls of sqrt(2 m E) + m g h, E their kinetic energy.
+    """
     momentum, weight = 0.0, norm(vec(s.gravity))
     for d in range(len(ws.step.sums_before)):
         mass = s.doll_masses[d]
@@ -31,11 +33,12 @@ def jam_threshold(s: System, ws: Workspace, h: float) -> float:
 
 @compiled
 def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) -> None:
-    """Set the initial impulses of m found contacts, by id: those of contacts.tried, the last trial
-    of this step, else those of ``known``, the last step, scaled by the ratio of step lengths, else
-    0. Marks as persistent those of contacts.start, and gives them start velocities by
-    take_start(). Where impacts are not sought, a new contact that closes fast is not persistent:
-    one that is not in ``known`` or had a gap above MET there.
+    """Set the initial impulses of m found contacts, matched by id: those of contacts.tried, the
+    last trial of this step; else those of ``known``, the last step, scaled by the ratio of step
+    lengths; else 0. Contacts that are in contacts.start are persistent, and get their gap and
+    velocities there by take_start(), which removes the friction, and its impulses, of those that
+    separate. Where impacts are not sought, a contact that closes fast is not persistent if it is
+    not in ``known`` or had a gap above MET there.
 
     Impulses of jammed contacts are undetermined and would grow from step to step: if the sum of the
     scaled normal impulses exceeds jam_threshold(), all begin at zero.

@@ -18,9 +18,11 @@ from .springs import mean_spring_force
 @compiled
 def account_work(s: System, ws: Workspace, v: np.ndarray, v_end: np.ndarray, h: float,
                  loads: np.ndarray, springs: np.ndarray, since: float) -> None:
-    """Add the work, J, of loads, grabs and drives in a step of h s to stats.work_pushes and
-    work_grabs, their impulses to step.external. Forces along the world's axes work in
-    load_potential(). step.middle and step.v_middle become those of the mean of v and ``v_end``.
+    """Add the work, J, in a step of h s of loads and drives to stats.work_pushes, of grabs and
+    joint springs to stats.work_grabs, and the impulses of all but joint springs to step.external.
+    The work of load forces that are constant in the world (local = 0) is left out: load_potential()
+    gives it. step.middle and step.v_middle become those of the mean of v and ``v_end``. ``since``:
+    see contact_step().
     """
     kin, q, mean, stats = ws.step.middle, ws.step.q_middle, ws.step.v_middle, ws.stats[0]
     for j in range(len(v)):

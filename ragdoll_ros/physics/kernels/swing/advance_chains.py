@@ -40,7 +40,10 @@ def bone_at(time: float, knots: np.ndarray, rows: np.ndarray, bone: int) -> np.n
 
 @compiled
 def substep_count(forces: tuple[Vec3, Vec3], r: np.ndarray) -> int:
-    """Number of steps into which to divide one of response ``r`` under forces, 1/s^2."""
+    """Number of substeps, up to MAX_SUBSTEPS, of a step of response ``r``, so that the phase of a
+    pendulum in a substep, its length times sqrt(f), is at most LARGEST_FORCED_PHASE. f: the larger
+    size of the ``forces``, 1/s^2, at both ends of the step.
+    """
     square = max(dot(forces[0], forces[0]), dot(forces[1], forces[1]))
     if square <= r.largest_square:
         return 1
@@ -51,12 +54,12 @@ def substep_count(forces: tuple[Vec3, Vec3], r: np.ndarray) -> int:
 @inlined
 def step_chain(links: np.ndarray, responses: np.ndarray, states: np.ndarray, start: int, stop: int,
                frame: Frame, forces: tuple[Vec3, Vec3], most: float) -> None:
-    """Integrate the links from ``start`` to ``stop`` over one step; ``frame``: at the first root at
-    its end; ``forces``: on the first link.
+    """Integrate the links from ``start`` to ``stop`` (excluded) over one step. ``frame``: at the
+    first root at the step's end; ``forces``, 1/s^2: on the first link at the step's start and end.
 
-    What hangs on other links turns by at most ``most`` rad/s, half a turn in an interval of the
-    grid, the frame at its root too: the next link resolves no more, and an undamped chain would
-    gain energy from aliasing, without end.
+    The rates of all links but the first, and the spins of the frames at their roots, are limited to
+    ``most`` rad/s; callers give half a turn in an interval of the grid. The next link cannot
+    resolve faster turns, and an undamped chain would gain energy from aliasing without end.
     """
     step_link(links[start], responses[start], states[start], frame, forces)
     for k in range(start + 1, stop):
@@ -69,7 +72,9 @@ def step_chain(links: np.ndarray, responses: np.ndarray, states: np.ndarray, sta
 @compiled
 def part_step(links: np.ndarray, responses: np.ndarray, states: np.ndarray, start: int, stop: int,
               frame: Frame, most: float) -> None:
-    """Integrate a chain over one of several steps into which one is divided."""
+    """Integrate a chain over one substep of a divided step. ``responses``: to the substep;
+    ``frame``: at the first root at its end.
+    """
     forces = root_forces(links[start], responses[start], states[start], frame)
     step_chain(links, responses, states, start, stop, frame, forces, most)
 
@@ -83,16 +88,19 @@ def set_responses(links: np.ndarray, h: float, responses: np.ndarray) -> None:
 
 @entry(NUMBER, KNOTS, ROWS, BONES)
 def bones_at(time: float, knots: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-    """Write the states (b, 13) of bones at ``time`` s; see set_bones()."""
+    """Write the states (b, 13) of bones at ``time`` s: set_bones() for callers outside compiled
+    code.
+    """
     set_bones(time, knots, rows, out)
 
 
 @entry(CHAINS, STATES, BONES, FLAG, FLAG)
 def begin_chains(chains: Chains, states: np.ndarray, bones: np.ndarray, has_directions: bool,
                  has_rates: bool) -> None:
-    """Start links (m,) on bones (b, 13), in the directions and with the rates that ``states`` has
-    of them; else in their rest directions, and at rest relative to their frames. Tips that are
-    inside colliders are moved out.
+    """Start the links (m,) of all chains on bones (b, 13) and write their ``states``. All links
+    keep the directions in ``states`` if ``has_directions``, and the rates there if ``has_rates``;
+    else they begin in their rest directions, and at rest relative to their frames. Tips inside
+    colliders are moved out.
     """
     matrix = np.empty((3, 3))
     chain = -1

@@ -73,7 +73,9 @@ def hermite(a: Vec3, b: Vec3, a_rate: Vec3, b_rate: Vec3, span: float,
 
 @compiled
 def turn_between(start: np.ndarray, end: np.ndarray, span: float) -> Vec3:
-    """Rotation vector, rad, from one state's orientation to the other's, with whole turns."""
+    """Rotation vector, rad, world axes, from one state's orientation to the other's, ``span`` s
+    later. The mean angular velocity determines the whole turns.
+    """
     q = quat_mul(orientation_of(end), quat_conj(orientation_of(start)))
     if q[3] < 0:
         q = -q[0], -q[1], -q[2], -q[3]

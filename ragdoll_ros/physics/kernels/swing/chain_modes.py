@@ -54,10 +54,10 @@ def solve_stiffness(springs: np.ndarray, weights: np.ndarray, first: int, f: np.
 def lowest_squares(lengths: np.ndarray, masses: np.ndarray, springs: np.ndarray,
                    weights: np.ndarray, out: np.ndarray) -> None:
     """Write to ``out`` (n,) the square, 1/s^2, of the lowest frequency of each link with all beyond
-    it, its root at rest; 0 where it has none.
+    it, its root at rest; 0 where the stiffness matrix has no inverse.
 
-    ``lengths`` m, ``masses`` kg at the ends, ``springs`` N m/rad at the roots, and ``weights``
-    N m/rad that gravity adds: each link's length times the weight beyond it.
+    ``lengths`` m, ``masses`` kg at the ends, ``springs`` N m/rad at the roots, and ``weights`` N
+    m/rad that gravity adds: each link's length times the weight of the masses from its own on.
     """
     n = len(lengths)
     x, f, inertia, pivots = np.empty(n), np.empty(n), np.empty(n), np.empty(n)

@@ -46,7 +46,9 @@ def longest_step(chains: Chains, states: np.ndarray, chain: int) -> float:
 @compiled
 def try_step(chains: Chains, states: np.ndarray, chain: int, h: float, bones_before: np.ndarray,
              bones: np.ndarray, holds_all: bool) -> float:
-    """Step a chain from chains.before by ``h`` s; the least gap, m, to what it did not touch."""
+    """Step a chain from chains.before by ``h`` s; ``bones_before``, ``bones`` (b, 13): states at
+    its start and end. Returns the least gap, m, see step_touching(); also for ``holds_all``.
+    """
     links, responses, before = chains.links, chains.part_responses, chains.before
     start, stop = chains.starts[chain], chains.ends[chain]
     around = Around(chains.colliders, chains.firsts[chain], chains.lasts[chain], bones_before,
@@ -87,8 +89,10 @@ def least_gap_before(chains: Chains, chain: int, bones: np.ndarray) -> float:
 @compiled
 def step_to_arrival(chains: Chains, states: np.ndarray, chain: int, high: float, high_gap: float,
                     bones_before: np.ndarray, bones: np.ndarray, path: Path) -> float:
-    """Step a chain to the first instant, s, at which a tip touches what it did not, before
-    ``high``, where the gap is ``high_gap``. By regula falsi with the factors of Illinois.
+    """Step a chain from chains.before, at path.origin, to the first instant before ``high``, s, at
+    which a tip touches a collider that it did not touch; at ``high`` the gap is ``high_gap``, m.
+    Uses regula falsi with the factors of Illinois, later bisection. Returns the time from
+    path.origin, s; ``bones`` are then those of that instant.
     """
     low, low_gap, span = 0.0, least_gap_before(chains, chain, bones_before), high
     side = 0

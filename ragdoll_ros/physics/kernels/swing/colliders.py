@@ -105,7 +105,9 @@ def tip_contact(link: np.ndarray, state: np.ndarray, collider: np.ndarray,
 @compiled
 def stop_at(link: np.ndarray, state: np.ndarray, collider: np.ndarray, bone: np.ndarray,
             is_held: bool) -> None:
-    """Take a touching tip's speed into a collider, and if it ``is_held`` there, out of it."""
+    """Remove a touching tip's speed into a collider, and if ``is_held``, also its speed out of it.
+    A link that is almost along the normal keeps its rate.
+    """
     gap, out, _, lever, speed = tip_contact(link, state, collider, bone)
     if gap < TOUCH and lever > LEAST_LEVER * link.length and (speed < 0 or is_held):
         put(state.rate, add_scaled(vec(state.rate), -speed / lever, out))
@@ -131,8 +133,10 @@ def move_out(link: np.ndarray, state: np.ndarray, frame: Frame, around: Around) 
 @compiled
 def step_touching(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np.ndarray,
                   frame: Frame, forces: tuple[Vec3, Vec3], around: Around) -> float:
-    """Integrate a link over one step from the state ``before``, which ``state`` equals, held
-    outside of those colliders that it touches there, or of all; the least gap, m, to the others.
+    """Integrate a link over one step; ``state`` equals ``before``. The tip is held outside of the
+    colliders that it touches in ``before``, or of all if around.holds_all. Returns the least gap,
+    m, after the step without these holding forces, to the other colliders and to those that the tip
+    has left.
     """
     colliders, bones_before, bones = around.colliders, around.before, around.after
     step_link(link, r, state, frame, forces)
@@ -156,7 +160,10 @@ def step_touching(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np
 @compiled
 def hold(link: np.ndarray, r: np.ndarray, before: np.ndarray, state: np.ndarray, frame: Frame,
          forces: tuple[Vec3, Vec3], around: Around) -> None:
-    """Repeat a step with the forces of the colliders that the tip touches; see step_touching()."""
+    """Repeat a step, with constant forces of the colliders that hold the tip, along their normals
+    at the start, so that the tip ends on their surfaces; then stop it there. See
+    step_touching().
+    """
     colliders, bones_before, bones = around.colliders, around.before, around.after
     first, until = around.first, around.until
     held = np.zeros(until - first)

@@ -188,13 +188,13 @@ def step_link(link: np.ndarray, r: np.ndarray, state: np.ndarray, frame: Frame,
 
 @compiled
 def limit_rate(link: np.ndarray, r: np.ndarray, state: np.ndarray, v: Vec3, left: Vec3) -> Vec3:
-    """Rate v, of which the part relative to the frame is scaled down where it has more energy than
-    before the correction of the spring force.
+    """Return the rate v, after the correction of the spring force, with its part relative to the
+    frame scaled down where kinetic and spring energy are more than before that correction.
 
     Energy is |v|^2 + w |log|^2, relative to the frame; ``left`` is the log map that the model
-    gives. If the frame turns about the link by 2 phi in the step, the true log map leads the
-    model's by phi, and the true rate lags by phi. Rotating the model's by -phi keeps the sum of
-    both energies to third order in the step; without it the limit would reduce the order to 1.
+    gives. If the frame turns about the link by phi in the step, the true log map leads the model's
+    by phi, and the true rate lags by phi. Rotating ``left`` by -phi keeps the sum of both energies
+    to third order in the step; without it the limit would reduce the order to 1.
     """
     w, d = link.stiffness, vec(state.direction)
     to_rest, drift = vec(state.to_rest), vec(state.drift)

@@ -34,8 +34,8 @@ def hull_support(system: int, hull: int, d: Vec3) -> Vec3:
 
 @compiled
 def supporting_vertex(s: System, hull: int, d: Vec3) -> int:
-    """Index in System.hull_vertices of the vertex that is farthest along d: by steps to the best
-    neighbor, from one that is farthest along an axis. On a convex surface none ends before.
+    """Index in System.hull_vertices of the vertex that is farthest along d. Hill climbing from one
+    that is farthest along an axis to the best neighbor; a convex hull has no other maximum.
     """
     table = s.hulls[hull]
     first, axis = table.first_vertex, 0 if abs(d[0]) > abs(d[1]) else 1
@@ -71,7 +71,9 @@ def edge_vector(system: int, hull: int, edge: int) -> Vec3:
 
 @compiled
 def is_supporting_edge(system: int, edge: int, d: Vec3) -> bool:
-    """Whether no point is farther along d, a unit vector perpendicular to an edge, than it is."""
+    """Whether an edge supports along d, a unit vector perpendicular to it: no point of the hull is
+    farther along d than the edge.
+    """
     inward = system_at(system).hull_edges[edge].inward
     return dot(vec(inward[0]), d) <= ROUNDING and dot(vec(inward[1]), d) <= ROUNDING
 
@@ -101,9 +103,9 @@ def hull_distance(system: int, hull: int, p: Vec3) -> tuple[float, Vec3]:
 @compiled
 def _triangle_distance(s: System, first: int, face: int, p: Vec3, normal: Vec3,
                        height: float) -> tuple[float, Vec3]:
-    """Distance, m, of a point ``height`` above the plane of a triangle from it, and the direction.
-    ``first``: the hull's first vertex.
-    Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    """Distance, m, of a point from a triangle, and the unit direction to the point, which is
+    ``height`` > 0 above the triangle's plane. ``first``: the hull's first vertex. Ericson,
+    Real-Time Collision Detection (2005), section 5.1.5.
     """
     least, nearest, is_inside = math.inf, p, True
     corners = s.hull_faces[face].corners
@@ -134,8 +136,9 @@ def hull_faces(system: int, hull: int) -> tuple[int, int]:
 
 @compiled
 def supporting_hull_face(system: int, hull: int, d: Vec3) -> int:
-    """Index in System.hull_faces of the face whose normal is nearest to d, of those that have the
-    vertex farthest along d: that is not on the one nearest of all where it is sharp.
+    """Index in System.hull_faces of the face whose normal is closest to d, of those that have the
+    vertex farthest along d. On a sharp hull, the face with the closest normal of all may not have
+    that vertex.
     """
     s = system_at(system)
     first, most = s.hulls[hull].first_face, -math.inf
@@ -159,9 +162,9 @@ def hull_plane(system: int, face: int) -> tuple[Vec3, float]:
 @compiled
 def face_polygon(system: int, hull: int, face: int, d: Vec3, most: int,
                  corners: np.ndarray) -> int:
-    """Write at most ``most`` corners of a face, among them that farthest along d, anticlockwise
-    from outside, to ``corners`` of CLIP_VERTEX; their feature ids are indices of vertices in the
-    hull. Returns their number.
+    """Write at most ``most`` corners of a face, anticlockwise from outside, to ``corners`` of
+    CLIP_VERTEX; their feature ids are indices of vertices in the hull. The first is the hull's
+    vertex farthest along d, if it is on the face. Returns their number.
     """
     s = system_at(system)
     table, polygon = s.hulls[hull], s.hull_faces[face]

@@ -117,9 +117,10 @@ def corner_direction(a: Shape, c: Vec3, corner: Vec3) -> Vec3:
 
 @compiled
 def is_allowed_from_a_side(d: Vec3, normal: Vec3, outward: Corners, edges: Vec3, k: int) -> bool:
-    """Whether both edges at corner k allow the direction ``d``, seen from the side of a's center or
-    from the side to which ``d`` points: a long shape on a sharp corner may have its center on one
-    side of a face, and that face's normal next to ``d`` on the other.
+    """Whether both edges at corner k allow the direction ``d``, seen from the side of the triangle
+    to which ``normal`` points, where a's center is; or, if ``d`` points to the other side, seen
+    from there. A long shape on a sharp corner may have its center on one side of the triangle's
+    plane while the contact's direction points to the other.
     """
     return is_allowed_at_corner(d, normal, outward, edges, k) or (
         dot(d, normal) < 0 and is_allowed_at_corner(d, neg(normal), outward,
@@ -128,7 +129,9 @@ def is_allowed_from_a_side(d: Vec3, normal: Vec3, outward: Corners, edges: Vec3,
 
 @compiled
 def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
-    """Separations of a shape from a triangle."""
+    """Find the largest separation of a's core from the triangle t along any axis, and the largest
+    along those that the edges allow, with its axis. Returns a LimitedAxis.
+    """
     corners, c = corners_of(t), sub(a.position, t.position)
     directions, normal, edges = edge_vectors(corners), column(t.rotation, 2), t.edges
     outward = outward_vectors(directions, normal)
@@ -181,8 +184,9 @@ def limited_axis(a: Shape, t: Shape) -> LimitedAxis:
 
 @compiled
 def is_beside(found: LimitedAxis, radius: float) -> bool:
-    """Whether a shape is beside a triangle, not on it, though it is below its plane: another face
-    explains that it is there.
+    """Whether a shape is beside a triangle, not on it: deeper than SHALLOW along the allowed axis,
+    but less than half as deep along the best axis of all. Another face explains that depth.
+    ``radius``: that of the core, see core_radius().
     """
     depth = found.allowed - radius
     return depth < -SHALLOW and found.distance - radius > depth / 2
@@ -190,18 +194,21 @@ def is_beside(found: LimitedAxis, radius: float) -> bool:
 
 @compiled
 def is_contact_axis(found: LimitedAxis) -> bool:
-    """Whether the allowed axis is that of a contact: it separates as much as any axis, to rounding,
-    or where shape and triangle overlap, not twice as deeply. In a notch of two edges that meet,
-    what lies on both is past the end of each, by its depth times a slope.
+    """Whether the allowed axis is that of a contact: the separation along it is the largest of all,
+    to IS_DISTANCE; or, where the core of the shape overlaps the triangle, the depth along it is
+    less than twice the least. The factor is for notches: where two faces meet at an angle, what
+    lies on both is past the end of each, by its depth times a slope.
     """
     return found.allowed > min(found.distance, 2 * found.distance) - IS_DISTANCE
 
 
 @compiled
 def triangle_separation(a: Shape, t: Shape, cutoff: float) -> float:
-    """Gap, m, of a shape and a triangle by the normals that its edges allow. Of what is beside it,
-    but near, this says how far it is from the triangle's plane, or from that of the next one. Of a
-    hull that is farther away than ``cutoff``, m, a lower bound.
+    """Gap, m, of a shape and a triangle along the best axis that the edges allow. Beside the
+    triangle, where another axis separates more and this is no contact axis, it is raised to the
+    distance less REACH, if that is more: within REACH it stays the height above this plane or the
+    next, but not below -BARELY. Where is_beside(), it is the distance, not below -BARELY. Of a hull
+    with a lower bound above ``cutoff``, m, it is that bound.
     """
     if a.kind == HULL:
         height, beside = triangle_lower_bounds(a, t)

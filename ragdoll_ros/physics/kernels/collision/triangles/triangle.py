@@ -63,7 +63,9 @@ def supporting_corner(corners: Corners, n: Vec3) -> int:
 
 @compiled
 def seen_from_below(edges: Vec3) -> Vec3:
-    """The edges for what is on the other side: what bends down there bends up here."""
+    """The values of ``edges`` seen from the other side: negated, as what bends down there bends up
+    here, except OPEN.
+    """
     a, b, c = edges
     return (a if a == OPEN else -a, b if b == OPEN else -b, c if c == OPEN else -c)
 

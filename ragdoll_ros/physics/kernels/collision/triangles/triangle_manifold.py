@@ -112,7 +112,10 @@ def triangle_edge(corners: Corners, feature: int) -> tuple[Vec3, Vec3]:
 
 @compiled
 def put_corners(corners: Corners, factor: float, out: np.ndarray) -> None:
-    """Write a triangle to ``out``, its last corner twice: polygons that clip have even numbers."""
+    """Write the corners of a triangle, scaled by ``factor`` about the centroid, to ``out`` (4,),
+    with feature ids 0 to 3. The last corner is written twice: a reference polygon of clip_polygon()
+    must have an even number of sides.
+    """
     for k in range(4):
         put(out[k].point, scale(factor, corners[min(k, 2)]))
         out[k].feature_id = k
@@ -120,8 +123,9 @@ def put_corners(corners: Corners, factor: float, out: np.ndarray) -> None:
 
 @compiled
 def widen(corners: Corners, edges: Vec3, out: np.ndarray) -> None:
-    """Move sides of a triangle that put_corners() wrote outwards by OVERLAP, where the surface
-    bends up: a corner of a in the valley is below both faces, and next to both of them.
+    """Move the sides of a triangle in ``out``, as put_corners() wrote it, outwards by OVERLAP where
+    the surface bends up. Else a corner of a in the valley would be clipped off: it is below both
+    faces, but beside each.
     """
     directions = edge_vectors(corners)
     for k in range(3):
@@ -141,10 +145,11 @@ def widen(corners: Corners, edges: Vec3, out: np.ndarray) -> None:
 @compiled
 def clip_by_triangle(a: Shape, arm: Vec3, corners: Corners, found: LimitedAxis,
                      scratch: np.ndarray) -> tuple[int, int]:
-    """Clip what of a's core supports against the triangle's normal by the triangle. Writes the
-    points to ``scratch`` from MAX_CLIPPED on. Returns their number, and how many there were before
-    those were left out that the next triangle has: of the triangles of a flat face that share its
-    corner, one has it.
+    """Clip the face, edge or vertex of a's core that supports against found.normal by the triangle.
+    Writes the points, midway in the gap, to ``scratch`` from MAX_CLIPPED on, without those at flat
+    or concave edges, which the next triangle has; a corner of a flat face that consists of several
+    triangles is kept by one of them. Returns the number of points, and the number before any were
+    left out. ``arm``: a's center from the triangle's, m.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
     sides, names = (scratch[2 * MAX_CLIPPED:2 * MAX_CLIPPED + MAX_CORNERS],
