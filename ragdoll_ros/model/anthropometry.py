@@ -1,11 +1,12 @@
-"""Anthropometric tables: segments of the body as fractions of its mass and of their length.
+"""Anthropometric tables: masses of body segments in percent of the body's mass, their centres and
+radii of gyration as fractions of their lengths, and body dimensions.
 
-Masses, centres, radii of gyration and lengths: de Leva 1996, J Biomech 29:1223, table 4, of 100
-men (1.741 m, 73.0 kg) and 15 women (1.735 m, 61.9 kg), young and fit. Limb segments go from joint
-centre to joint centre, the head from vertex to mid-gonion, the hand to the third metacarpal's
-head, the foot from heel to toe. Percentiles and breadths: ANSUR II, the survey of US soldiers of
-2012 (Gordon et al., NATICK/TR-15/007), so of fit adults; breadths and circumferences are means over
-its men and women together.
+Masses, centres, radii of gyration and lengths: de Leva 1996, J Biomech 29:1223, table 4, of 100 men
+(1.741 m, 73.0 kg) and 15 women (1.735 m, 61.9 kg), young and fit. Limb segments go from joint
+centre to joint centre, the head from vertex to mid-gonion, the hand to the third metacarpal's head,
+the foot from heel to toe. Percentiles and body dimensions: ANSUR II, the survey of US soldiers of
+2012 (Gordon et al., NATICK/TR-15/007), that is of fit adults; the dimensions are means over its men
+and women together.
 """
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ SEXES = ('female', 'male')
 
 @dataclass(frozen=True)
 class Segment:
-    """A segment of the body; limbs of one side."""
+    """A segment of the body; of a limb, that of one side."""
 
     mass: float
     """Percent of the body's."""
@@ -34,7 +35,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Sample:
-    """The mean person of a table."""
+    """The mean person of a sample: height and body segments."""
 
     height: float
     """m"""
@@ -97,7 +98,9 @@ HEIGHT, MASS = 1.71441, 79.709
 
 
 def mass_fractions(sex: str) -> dict[str, float]:
-    """Fraction of the body's mass of each segment, limbs of one side; the whole body is 1."""
+    """Return the fraction of the body's mass of each segment. A limb's is that of one side; the
+    fractions of the whole body, both sides included, sum to 1.
+    """
     table = SAMPLES[sex].segments
     whole = sum(part.mass * (1 if name in UNPAIRED else 2) for name, part in table.items())
     return {name: part.mass / whole for name, part in table.items()}

@@ -1,4 +1,4 @@
-"""BiomechanicalLimits: what regions of the body bear, and how stiff they are."""
+"""BiomechanicalLimits: force limits and stiffness of the regions of the body."""
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -12,7 +12,7 @@ SIDES = ('left_', 'right_')
 
 @dataclass(frozen=True)
 class BodyRegion:
-    """A region of the body as a linear spring with limits of its force.
+    """A region of the body as a linear spring with force limits.
 
     Raises:
         NotFinite, NotPositive: for its fields.

@@ -23,10 +23,11 @@ over the largest moment. Numbers of six digits meet it; the error of the motion 
 class Compound:
     """Primitive shapes fixed to each other. Uniform density; overlaps count twice.
 
-    A Bone without ``moments`` wants the origin at the centre of mass and principal axes.
+    A Bone without ``moments`` requires the origin at the centre of mass, and principal axes of
+    inertia as axes.
 
     Args:
-        parts: at least one Part in the compound's axes, else it raises WrongForm.
+        parts: Part objects, in the compound's axes. Raises WrongForm if there is none.
 
     Example:
         >>> dumbbell = Compound((Part(Sphere(0.1), (0, 0, 0.3)), Part(Sphere(0.1), (0, 0, -0.3))))
@@ -59,12 +60,12 @@ class Compound:
 
     @property
     def support_terms(self) -> tuple[float, ...]:
-        """Terms of its bounding box, an upper bound."""
+        """Terms of support_distance() for its bounding box: an upper bound."""
         return (*self.half_extents, 0.0, 0.0, 0.0)
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """Those of all parts, to draw; hulls as they are."""
+        """The primitives of all parts, to draw; hulls are kept as they are."""
         return tuple(Part.at(piece.shape, part.pose.compose(piece.pose))
                      for part in self.parts
                      for piece in part.shape.primitives or (Part(part.shape),))
@@ -90,7 +91,10 @@ class Compound:
         return vector(np.diag(self.inertia_matrix(mass)))
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """Minimum over the parts, (p,) m, at points (p, 3); inside, a lower bound of the depth."""
+        """Minimum of the parts' signed distances (p,) m at points (p, 3). Inside, its absolute
+        value is a lower bound of the depth, unless a part is a hull: its distance is that from its
+        bounding box.
+        """
         return np.min([part.shape.signed_distance(part.pose.apply_inverse(points))
                        for part in self.parts], axis=0)
 
@@ -128,7 +132,7 @@ class Compound:
                 f'axes are turned by {list(turn)}'))
 
     def _mass_fractions(self) -> np.ndarray:
-        """(p,), sum 1."""
+        """Mass fraction (p,) of each part; they sum to 1."""
         volumes = np.array([part.shape.volume for part in self.parts])
         return volumes / volumes.sum()
 

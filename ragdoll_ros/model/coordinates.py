@@ -11,8 +11,8 @@ from .scene_change import SceneChange
 
 def placed_coordinates(placements: Sequence[Placement],
                        layout: DofLayout | None = None) -> GeneralizedState:
-    """Coordinates and velocities of dolls as they are placed: where a simulation starts.
-    ``layout``: that of the dolls, if there is one already.
+    """Coordinates and velocities of dolls as they are placed, at which a simulation starts.
+    ``layout`` is that of the dolls; None: it is computed.
     """
     layout = layout or DofLayout([placement.doll for placement in placements])
     q, v = np.zeros(layout.sizes[0]), np.zeros(layout.sizes[1])
@@ -32,8 +32,8 @@ def placed_coordinates(placements: Sequence[Placement],
 
 
 def changed_coordinates(coordinates: GeneralizedState, change: SceneChange) -> GeneralizedState:
-    """Coordinates and velocities of the dolls after a change: those of ``coordinates``, which are
-    of the dolls before, and new dolls as they are placed.
+    """Coordinates and velocities of the dolls after a change. Dolls that stay keep those in
+    ``coordinates``, which are of the scene before; new dolls start as they are placed.
     """
     before, after = (DofLayout([placement.doll for placement in scene.dolls])
                      for scene in (change.before, change.after))

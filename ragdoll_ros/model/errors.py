@@ -13,7 +13,9 @@ MAX_LISTED_NAMES = 40
 
 
 def one_of(names: Sequence[str], wrong: str) -> str:
-    """Text that lists the valid names."""
+    """Text that lists the valid names; of more than MAX_LISTED_NAMES only five, those next to
+    ``wrong`` in the alphabet.
+    """
     if len(names) <= MAX_LISTED_NAMES:
         return 'one of ' + ', '.join(names)
     ordered = sorted(names)
@@ -59,7 +61,7 @@ class Closed(RagdollError):
 
 
 class NotPositive(ModelError):
-    """A size, mass or duration that is not above zero."""
+    """A number that must be above zero and is not."""
 
 
 class NotFinite(ModelError):
@@ -79,7 +81,7 @@ class LimitsReversed(ModelError):
 
 
 class WrongAxes(ModelError):
-    """A joint whose axes or limits do not fit its kind."""
+    """A joint of an unknown kind, or whose axes or limits do not fit its kind."""
 
 
 class OffCentre(ModelError):
@@ -91,15 +93,15 @@ class NotPrincipal(ModelError):
 
 
 class UnknownJoint(ModelError):
-    """No joint angle, or joint of a file, has the name."""
+    """No joint or joint angle has the name."""
 
 
 class UnknownBone(ModelError):
-    """No bone has the name."""
+    """No bone, or rider of a skeleton, has the name."""
 
 
 class UnknownDoll(ModelError):
-    """No doll has the name."""
+    """No doll, driven body or robot has the name."""
 
 
 class UnknownAnimation(ModelError):
@@ -107,11 +109,11 @@ class UnknownAnimation(ModelError):
 
 
 class DuplicateName(ModelError):
-    """Two of a kind have the same name."""
+    """A name that must be unique is used twice, or is reserved."""
 
 
 class ConnectedTwice(ModelError):
-    """A bone that is the child of two joints."""
+    """A bone, link or node with two parents."""
 
 
 class JointCycle(ModelError):
@@ -119,7 +121,9 @@ class JointCycle(ModelError):
 
 
 class Detached(ModelError):
-    """No bone, or several without a parent: not one tree."""
+    """Bones that do not form one tree, as there is none or several have no parent; or a root where
+    a bone with a parent is needed.
+    """
 
 
 class WrongForm(ModelError):
@@ -127,7 +131,7 @@ class WrongForm(ModelError):
 
 
 class Unreadable(ModelError):
-    """A file that is missing or can not be parsed."""
+    """A file that is missing, or cannot be parsed or written."""
 
 
 class ModelErrors(RagdollError):
@@ -146,7 +150,9 @@ class ModelErrors(RagdollError):
 
 @contextlib.contextmanager
 def naming(path: str) -> Iterator[None]:
-    """Raise ModelErrors that name a file for what is wrong with it or keeps it from being read."""
+    """Context in which a ModelError, OSError or ValueError becomes ModelErrors that name the file
+    ``path``; the latter two as Unreadable. ModelErrors pass unchanged.
+    """
     try:
         yield
     except ModelErrors:
@@ -167,7 +173,7 @@ def check_finite(path: str, values: object) -> None:
 
 
 def check_positive(path: str, values: object) -> None:
-    """Raise NotPositive unless every number in ``values`` is finite and above zero."""
+    """Raise NotFinite or NotPositive unless every number in ``values`` is finite and above zero."""
     numbers = values if isinstance(values, tuple) else (values,)
     check_finite(path, values)
     if not all(number > 0 for number in numbers):

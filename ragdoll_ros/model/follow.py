@@ -1,4 +1,4 @@
-"""Follow: that a body of a scene moves as it is told, exactly or by limited forces."""
+"""Follow: how a driven body of a scene follows a given motion, exactly or by limited forces."""
 import math
 from dataclasses import dataclass
 
@@ -9,8 +9,8 @@ from . import errors
 class Follow:
     """How a body follows the motion that Simulation.drive_body() gives it.
 
-    By default exactly: nothing that it touches changes its velocity, as of infinite mass (a
-    kinematic body in Box2D). With limits it is moved by forces, and gives way to what is stronger.
+    By default it follows exactly: no contact changes its velocity, as if its mass were infinite (a
+    kinematic body in Box2D). With limits it is moved by forces, and yields to stronger ones.
 
     Args:
         max_force: N, at its centre of mass.
@@ -34,5 +34,5 @@ class Follow:
 
     @property
     def is_exact(self) -> bool:
-        """Whether no force can be too large for it."""
+        """Whether it follows exactly: both limits are infinite."""
         return self == Follow()

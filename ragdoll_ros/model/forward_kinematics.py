@@ -17,7 +17,9 @@ from .ragdoll import Bone, Ragdoll, joint_axes
 
 @dataclass(frozen=True)
 class BoneMotion:
-    """Pose and velocity of a bone, in the doll's frame, whose root is at rest in its bind pose."""
+    """Pose and velocity of a bone in one frame, such as the doll's. In those that bone_motions()
+    returns, the root is at rest in its bind pose; in motions of files it moves.
+    """
 
     turn: np.ndarray
     """Quaternion (4,) of the rotation since the bind pose."""
@@ -29,7 +31,7 @@ class BoneMotion:
     """(3,) rad/s."""
 
     def pose(self, bone: Bone) -> Pose:
-        """The pose of the bone that moves so."""
+        """The pose of ``bone``, whose motion this is."""
         return Pose(self.position, rotation.multiply(self.turn, np.array(bone.orientation)))
 
 

@@ -1,8 +1,8 @@
 """Inverse kinematics: joint angles and rates at which a doll follows given motions of its bones.
 
-From the root, which follows exactly, to the tips: each joint takes the rotation of its child as far
-as its axes and limits allow, relative to where its parent has come. Positions follow from the
-anchors; the distances that remain say how well the doll can follow.
+The joints are solved from the root, which follows exactly, to the tips: each takes the rotation of
+its child, relative to the orientation that its parent has reached, as far as its axes and limits
+allow. Positions follow from the anchors; the remaining distances tell how well the doll can follow.
 """
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ limits of a swing end at 85."""
 
 @dataclass(frozen=True)
 class FollowedMotion:
-    """Pose and velocity of a doll, as of a Placement, and how well it follows what was asked."""
+    """Pose and velocity of a doll, as in a Placement, and how closely it follows given motions."""
 
     pose: Pose
     """Of the doll's frame."""
@@ -46,9 +46,10 @@ class FollowedMotion:
 
 
 def follow_motions(doll: Ragdoll, motions: Mapping[str, BoneMotion]) -> FollowedMotion:
-    """The doll at ``motions`` of its bones, by name, in the frame that the result is in.
+    """Pose, velocity and joint angles with which the doll follows ``motions`` of its bones, by
+    name. The result is in the frame of the motions.
 
-    The root needs one; a joint whose child has none stays at zero.
+    The root must have a motion; a joint whose child has none stays at zero.
     """
     found = follow_turns(doll, motions)
     angles, rates = ({name: float(each[key]) for name, each in found.items()} for key in (0, 1))
@@ -58,9 +59,9 @@ def follow_motions(doll: Ragdoll, motions: Mapping[str, BoneMotion]) -> Followed
 
 def follow_turns(doll: Ragdoll, motions: Mapping[str, BoneMotion]
                  ) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Joint angles (...), rad, at which a doll follows the rotations of its bones, with their
-    rates, rad/s, and whether they are clipped, by name; for stacked motions, turns (..., 4) and
-    spins (..., 3).
+    """Joint angles, rad, and rates, rad/s, at which a doll follows the rotations of its bones, and
+    whether each angle is clipped: arrays (...), by the angle's name. Motions may be stacked, with
+    turns (..., 4) and spins (..., 3). Joints whose child has no motion are left out.
     """
     root = motions[doll.root.name]
     turns, spins, found = {doll.root.name: root.turn}, {doll.root.name: root.spin}, {}
@@ -125,7 +126,9 @@ def _joint_angles(joint: Joint, turn: np.ndarray,
 
 def _twist(axis: np.ndarray, turn: np.ndarray,
            spin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation about ``axis`` nearest to ``turn``, and its rate: 2 atan(turn . axis / w)."""
+    """Angle, rad, of the rotation about ``axis`` nearest to ``turn``, 2 atan(turn . axis / w), and
+    its rate, rad/s.
+    """
     along, w = turn[..., :3] @ axis, turn[..., 3]
     spins = np.concatenate([spin, np.zeros((*spin.shape[:-1], 1))], axis=-1)
     changes = rotation.multiply(spins, turn) / 2
@@ -141,8 +144,8 @@ def _limits(joint: Joint) -> tuple[Limits | None, ...]:
 
 def _clip(angle: np.ndarray, rate: np.ndarray,
           limits: Limits | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Angles within their limits, their rates, and whether they had to be clipped by more than
-    rounding.
+    """Angles within their limits, with the multiple of 2 pi that is nearest to them; their rates,
+    zero beyond a limit; and whether they were beyond it by more than CLIP_TOLERANCE.
     """
     if limits is None:
         return angle, rate, np.zeros(angle.shape, bool)

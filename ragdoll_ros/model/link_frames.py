@@ -1,7 +1,8 @@
 """Frames of the links of a scene's swings, which move the skin of hair.
 
-A link's frame has its origin at the link's root. At rest it has the axes of the swing's bone; it
-turns with the rod by the smallest rotation, after the links before it.
+A link's frame has its origin at the link's root. At rest it has the axes of the swing's bone. In
+motion it is the frame of the link before it, or of the bone, turned by the smallest rotation that
+takes the link's rest direction to its rod.
 """
 import numpy as np
 

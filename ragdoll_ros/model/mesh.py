@@ -31,11 +31,12 @@ OPEN = 1e9
 
 @dataclass(frozen=True)
 class Triangles:
-    """The triangles of a surface, each with its frame.
+    """The triangles of a surface, with normals and the angles at their edges.
 
     ``corners`` (t, 3, 3) m, anticlockwise about the normal; ``normals`` (t, 3); ``edges`` (t, 3):
     tangent of half the angle by which the surface bends down at the edge from corner k to k + 1,
-    negative where it bends up, OPEN where no triangle, or more than one, follows.
+    negative where it bends up; OPEN where the edge does not have exactly one neighbour, where that
+    has the opposite orientation, or where the surface is folded back.
     """
 
     corners: np.ndarray
@@ -66,8 +67,8 @@ class Surface:
         return (np.asarray(direction, float) @ self.mesh()[0].T).max(axis=-1)
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """Distance (p,) m of points (p, 3) from its bounding box, negative inside: at most that
-        from its surface.
+        """Signed distance (p,) m of points (p, 3) from its bounding box, negative inside: a lower
+        bound of the distance from the surface.
         """
         lower, upper = self.bounds
         beyond = np.maximum(lower - points, points - upper)
@@ -143,12 +144,12 @@ class Mesh(Surface):
 
 @dataclass(frozen=True, eq=False)
 class Hull(Mesh, Solid):
-    """A convex polyhedron, of uniform density as a part of a Compound, by which it may move.
+    """A convex polyhedron. As a part of a Compound it has uniform density and may move.
 
-    Raises WrongForm where a vertex is outside a face.
+    Raises WrongForm where a vertex is outside a face or the surface is not closed.
 
     Args:
-        vertices, faces, source: as of a Mesh; the surface is closed.
+        vertices, faces, source: as of a Mesh; the surface must be closed.
 
     Example:
         >>> tetrahedron = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -189,11 +190,13 @@ class Hull(Mesh, Solid):
 
     @property
     def support_terms(self) -> tuple[float, ...]:
-        """Terms of its bounding box, an upper bound."""
+        """Terms of support_distance() for its bounding box: an upper bound."""
         return (*self.half_extents, 0.0, 0.0, 0.0)
 
     def turned_inertia(self, mass: float, axes: np.ndarray) -> np.ndarray:
-        """Inertia (3, 3) kg m^2 about its centre of mass, its own ``axes`` being the columns."""
+        """Inertia (3, 3) kg m^2 about its centre of mass, in the frame in which its own axes are
+        the columns of ``axes`` (3, 3).
+        """
         return mass * (axes @ self._mass_integrals[2] @ axes.T)
 
     @functools.cached_property
@@ -318,7 +321,9 @@ def connected(vertices: np.ndarray, faces: np.ndarray) -> Triangles:
 
 
 def _array(path: str, value: object, dimensions: int, form: str) -> np.ndarray:
-    """An array (r, c) of finite floats, with an error that names the first row that is not."""
+    """Convert to an array (r, c) of finite floats. Raises WrongForm, or NotFinite for the first
+    number that is not finite, with its row and column in the path.
+    """
     try:
         array = np.array(value, float)
     except (TypeError, ValueError):

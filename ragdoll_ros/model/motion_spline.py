@@ -56,7 +56,7 @@ class MotionSpline:
 
     @property
     def duration(self) -> float:
-        """Of its last sample, s."""
+        """Time of the last sample, s."""
         return float(self.times[-1])
 
     @cached_property

@@ -21,7 +21,7 @@ MAX_FREQUENCY, MAX_DAMPING_RATIO = 1000.0, 100.0
 
 
 class Motor(NamedTuple):
-    """The motor of a joint angle: N m/rad, N m s/rad and N m."""
+    """The motor of a joint angle: stiffness, N m/rad, damping, N m s/rad, and torque limit, N m."""
 
     stiffness: float
     damping: float
@@ -33,10 +33,10 @@ class Motors:
     """Motors on all joint angles of a doll, which drive it to a target pose.
 
     The torque on an angle is s (k (target - angle) + c (target's rate - rate)), at most s times
-    ``max_torque``, with the strength s. Without ``stiffness``, k is that at which what hangs on the
-    joint would oscillate with ``frequency``, with its parent held in the bind pose; without
-    ``damping``, c gives that oscillation its ``damping_ratio``. This is how Jolt's motors and
-    MuJoCo's position actuators (``kp``, ``kv``, ``forcerange``) are set.
+    ``max_torque``, with the strength s. Without ``stiffness``, k is such that all bones beyond the
+    joint, as one body, would oscillate with ``frequency`` in the bind pose while the parent is
+    held; without ``damping``, c gives that oscillation its ``damping_ratio``. This is how Jolt's
+    motors and MuJoCo's position actuators (``kp``, ``kv``, ``forcerange``) are set.
 
     Args:
         frequency: Hz.
@@ -47,7 +47,7 @@ class Motors:
         strength: s at the start, 0 to 1.
 
     Raises:
-        NotFinite, OutOfRange, WrongForm: for a number that is out of its range, or is none.
+        OutOfRange: for a number that is out of its range, or is not a number (NaN).
 
     Example:
         >>> Motors(frequency=4, max_torque=80).strength
@@ -73,8 +73,8 @@ class Motors:
     def of(self, doll: Ragdoll) -> dict[str, Motor]:
         """The motor of each joint angle of a doll, by its name, at strength 1.
 
-        Raises UnknownJoint for a name that the doll does not have. Ball joints without limits have
-        no angles, and no motors.
+        Raises UnknownJoint for a name that the doll does not have. Ball joints without limits,
+        whose coordinates are quaternions, have no motors.
         """
         inertias = angle_inertias(doll)
         for key in ('stiffness', 'damping', 'max_torque'):

@@ -20,7 +20,8 @@ STEEPEST = 40.0
 
 @dataclass(frozen=True)
 class PassiveEnd:
-    """One end of the range: ``torque`` N m at ``angle`` rad, e times as much per ``width`` rad.
+    """One end of the range: the torque is ``torque`` N m at ``angle`` rad, and grows by a factor of
+    e for each ``width`` rad beyond.
 
     Angle and width are rounded to 1e-9 degrees. Raises NotFinite, NotPositive.
     """
@@ -39,7 +40,9 @@ class PassiveEnd:
             for key in ('angle', 'width')})
 
     def growth(self, distance: float) -> float:
-        """Ratio of the torque ``distance`` rad beyond the end to that at it."""
+        """Ratio of the torque ``distance`` rad beyond the end to the torque at the end; its
+        exponent is at most STEEPEST.
+        """
         return math.exp(min(distance / self.width, STEEPEST))
 
 

@@ -1,4 +1,4 @@
-"""PerDoll: what is computed for a doll or its placement, kept while it is in a scene whose dolls
+"""PerDoll: results computed for dolls or placements, kept while these are in a scene whose dolls
 change.
 """
 from __future__ import annotations
@@ -10,8 +10,8 @@ Value = TypeVar('Value')
 
 
 class PerDoll(Generic[Value]):
-    """``make(doll)`` for each doll that is asked for, once. Dolls are told apart by identity, not
-    equality: 0.0 and -0.0 are equal, but differ as text and in bits.
+    """Results of ``make(doll)``, computed once for each doll that is asked for. Dolls are told
+    apart by identity, not equality: 0.0 and -0.0 are equal, but differ as text and in bits.
     """
 
     def __init__(self, make: Callable[[Any], Value]) -> None:
@@ -19,13 +19,13 @@ class PerDoll(Generic[Value]):
         self._kept: dict[int, tuple[object, Value]] = {}
 
     def __getitem__(self, doll: object) -> Value:
-        """What was made for this doll, or is made now."""
+        """The result for this doll, computed at the first request."""
         kept = self._kept.get(id(doll))
         if kept is None:
             kept = self._kept[id(doll)] = doll, self._make(doll)
         return kept[1]
 
     def keep(self, dolls: Iterable[object]) -> None:
-        """Forget all other dolls."""
+        """Discard the results of all dolls but these."""
         present = {id(doll) for doll in dolls}
         self._kept = {key: kept for key, kept in self._kept.items() if key in present}

@@ -13,8 +13,8 @@ DRAWN_SIZE = 100.0
 
 @dataclass(frozen=True)
 class Plane:
-    """The half space below its own x-y plane, without end; its z axis is the normal. Static bodies
-    alone have it.
+    """The half space below its own x-y plane, without end; its z axis is the normal. Only static
+    bodies can have this shape.
 
     Example:
         >>> StaticBody('shelf', Plane(), position=(0, 0, 0.2)).normal

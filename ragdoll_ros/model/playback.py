@@ -21,8 +21,9 @@ SHORTEST_LOOP = 0.02
 
 @dataclass(frozen=True)
 class Playback:
-    """An animation that moves a doll, whatever acts on it, until it goes limp; then it falls, from
-    the pose and with the velocities of that instant. Times are simulated time since the start.
+    """An animation that moves a doll, whatever acts on it, until the doll goes limp; then the doll
+    falls, from the pose and with the velocities of that instant. With motors it only sets their
+    targets. Times are simulated time since the start.
 
     Args:
         name: of the animation.
@@ -32,13 +33,13 @@ class Playback:
         loop: whether it is repeated, from where it ended and facing as there; else the doll then
             stands until it goes limp.
         limp_at: s, when the doll goes limp; infinity: only when it is told to.
-        limp_above: N: it goes limp when a push, a drive or a hand on it is stronger; infinity: none
-            does that.
-        file: absolute path of the .bvh that the animation is of; None: of the doll's character.
+        limp_above: N: the doll goes limp when a push, a drive or a hand on it is stronger;
+            infinity: never for that reason.
+        file: absolute path of the animation's .bvh; None: it is of the doll's character.
         bones: names of joints of that file by those of bodies, where they were chosen.
 
     Raises:
-        OutOfRange, NotFinite: for a number that is out of its range, or a loop below 0.02 s.
+        OutOfRange, NotPositive, NotFinite: for a number out of range, or a loop below 0.02 s.
     """
 
     name: str
@@ -74,7 +75,9 @@ class Playback:
         return int(passed), rest
 
     def left(self, elapsed: float) -> float:
-        """Time, s, from then on until the animation ends or begins anew; infinity after its end."""
+        """Time, s, from ``elapsed`` s after the start until the animation ends or begins anew;
+        infinity after its end.
+        """
         left = (self.motion.duration - self.phase(elapsed)) / self.speed
         return left if left > 0 else math.inf
 

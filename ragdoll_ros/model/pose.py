@@ -28,11 +28,11 @@ class Pose(NamedTuple):
         return rotation.rotate(back, np.subtract(points, self.position))
 
     def compose(self, inner: Pose) -> Pose:
-        """Pose in the parent of what has the pose ``inner`` in the frame."""
+        """Pose in the parent of a frame whose pose in this frame is ``inner``."""
         return Pose(self.apply(inner.position),
                     rotation.multiply(self.orientation, inner.orientation))
 
     def relative(self, pose: Pose) -> Pose:
-        """Pose in the frame of what has the ``pose`` in the parent."""
+        """Pose in this frame of a frame whose pose in the parent is ``pose``."""
         back = rotation.inverse(self.orientation)
         return Pose(self.apply_inverse(pose.position), rotation.multiply(back, pose.orientation))

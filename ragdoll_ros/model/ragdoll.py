@@ -128,9 +128,9 @@ class Joint:
     - universal: the first axis is fixed in the parent, the second in the child, perpendicular in
       the bind pose; R = R(first) R(second).
     - ball: one axis, the twist axis; free, or with limits (-s, s), s up to 85 degrees, about two
-      axes across it (a pyramid, as in PhysX) and a twist (-t, t). Or two axes, twist and x
-      across it, and three pairs of limits: about x, which is fixed in the parent, about
-      y = twist axis times x (up to 85 degrees), and the twist.
+      axes across it (a pyramid, as in PhysX) and a twist (-t, t). Or two axes, twist and x across
+      it, and three pairs of limits: about x, which is fixed in the parent, about y = twist axis
+      times x (up to 85 degrees), and the twist.
     - fixed: no axes.
 
     Args:
@@ -142,8 +142,8 @@ class Joint:
             files in degrees read back to the same bits.
         damping: N m s/rad on each axis.
         names: of the angles; default the child's, with a suffix where there are several.
-        passive: elastic torque on each angle, None for none; the engine rigid has them. A ball
-            joint without limits has no angles, and so none.
+        passive: elastic torque on each angle, None for none; only the engine rigid simulates it. A
+            ball joint without limits, whose coordinate is a quaternion, has none.
 
     Raises:
         WrongAxes, LimitsReversed, OutOfRange, WrongForm, NotUnit, NotFinite: for its fields.
@@ -319,7 +319,9 @@ class Ragdoll:
 
     @cached_property
     def extent(self) -> float:
-        """Upper bound, m, of the longest edge of its bounding box in the bind pose."""
+        """Size, m, in the bind pose: longest edge of the box around the bones' centres, plus twice
+        the largest half extent of a bone along its own axes. Rotated bones may reach beyond it.
+        """
         positions = np.array([bone.position for bone in self.bones])
         return float(np.ptp(positions, axis=0).max() + 2 * self.largest_half_extents.max())
 
@@ -388,7 +390,9 @@ class Ragdoll:
         return dataclasses.replace(self, bones=bones)
 
     def renamed(self, rename: Callable[[str], str]) -> Ragdoll:
-        """A copy with every bone renamed, and every angle that has a name of its own."""
+        """A copy in which ``rename`` is applied to the name of every bone, and to every angle name
+        given in Joint.names.
+        """
         bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
         joints = tuple(dataclasses.replace(
             joint, parent=rename(joint.parent), child=rename(joint.child),
@@ -524,9 +528,10 @@ def _is_ancestor(parent_of: dict[str, str], start: str, goal: str) -> bool:
 
 
 def _checked_moments(moments: Vector) -> Vector:
-    """Principal moments that fulfil the triangle inequality, with a tolerance of 1e-6.
+    """Principal moments that fulfil the triangle inequality; a relative excess of up to 1e-6 is
+    removed.
 
-    Rounding beyond it is removed: PyBullet takes such an inertia for zero, MuJoCo refuses it.
+    PyBullet takes an inertia with such an excess for zero, MuJoCo refuses it.
     """
     errors.check_positive('inertia', moments)
     others = tuple(sum(moments[:axis] + moments[axis + 1:]) for axis in range(3))

@@ -1,4 +1,4 @@
-"""Robot: links that driven bodies stand for, on a tree of joints that are told how to move."""
+"""Robot: driven bodies as the links of a tree of joints, which move by given joint values."""
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -101,7 +101,9 @@ class Robot:
 
     @cached_property
     def driven(self) -> tuple[RobotJoint, ...]:
-        """The k joints that move by themselves, in the order of all arrays of values."""
+        """The k joints that are neither fixed nor mimic another one, in the order of all arrays of
+        values.
+        """
         return tuple(joint for joint in self.joints if joint.kind != 'fixed' and not joint.mimic)
 
     @cached_property

@@ -21,8 +21,8 @@ def sine_and_cosine(angle: float) -> tuple[float, float]:
     """Sine and cosine of a finite angle in rad, by the Taylor series in 50 digits, rounded once.
 
     They have the same bits with every C library and processor: initial states are computed with
-    them, so that simulations agree to the bit across machines. An angle above LARGE_TURNS is first
-    reduced modulo a turn in float64.
+    them, so that simulations agree to the bit across machines. An angle of more than LARGE_TURNS
+    turns is first reduced modulo a turn in float64.
     """
     if abs(angle) > LARGE_TURNS * math.tau:
         angle = math.fmod(angle, math.tau)
@@ -136,9 +136,9 @@ def nearest_rotation(matrix: ArrayLike) -> np.ndarray:
 def nearest_rotation_spin(changed: ArrayLike, rate: ArrayLike) -> np.ndarray:
     """Angular velocities (..., 3) of nearest_rotation() of matrices A (..., 3, 3), outer axes.
 
-    ``rate`` is dA/dt. With A = R P, P symmetric, and the spin w in the body's axes,
-    R^T dA/dt - its transpose = [w] P + P [w] = [(trace(P) - P) w]. Where the nearest rotation is
-    not unique, as of zero, the smallest of all.
+    ``rate`` is dA/dt. With A = R P, P symmetric, and the spin w in the body's axes, R^T dA/dt - its
+    transpose = [w] P + P [w] = [(trace(P) - P) w]. Where the nearest rotation is not unique, as for
+    A = 0, the smallest solution w.
     """
     r = matrix(nearest_rotation(changed))
     back = np.swapaxes(r, -1, -2)

@@ -120,16 +120,16 @@ class Placement:
         animation: what moves the doll until it goes limp, see Animation.play(). Position,
             orientation and velocity are then those of the animation's frame; spin, angles and rates
             are its own.
-        motors: what drives the joints to the initial pose, or, beside an animation, to its poses,
-            while the root is free; None: nothing.
+        motors: what drives the joints to the initial pose, or, beside an animation, to its poses;
+            the root is not driven. None: nothing.
         fixed_root: whether the root stays where it is, attached to the world, whatever acts on it:
             a lamp that hangs, a door, a robot's arm.
 
     Raises:
-        NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none; for ``follow`` of a
-            doll of several bones, or with a velocity of what follows exactly or of a fixed root;
-            for a spin, angles, rates or ``follow`` beside an animation, or an animation of another
-            doll; for an animation or ``follow`` of a fixed root.
+        NotFinite, NotUnit, WrongForm: for a malformed vector or quaternion; for ``follow`` of a
+            doll of several bones; for a velocity or spin of a body that follows exactly or of a
+            fixed root; for a spin, angles, rates or ``follow`` beside an animation, or an animation
+            of another doll; for an animation or ``follow`` of a fixed root.
         UnknownJoint, OutOfRange: for an angle that the doll does not have, or outside its limits.
 
     Example:
@@ -180,17 +180,17 @@ class Placement:
 
     @property
     def is_kinematic(self) -> bool:
-        """Whether it moves as it is told, whatever acts on it."""
+        """Whether it follows Simulation.drive_body() exactly, as a kinematic body."""
         return self.follow is not None and self.follow.is_exact
 
     @cached_property
     def start(self) -> 'Placement':
-        """The doll as its animation has it at the start; itself without one."""
+        """The placement at the start of its animation; itself if it has none."""
         return self if self.animation is None else _started(self, self.animation)
 
     @property
     def is_posed(self) -> bool:
-        """Whether it starts with joint angles or rates."""
+        """Whether it starts with joint angles or rates, or with an animation."""
         return bool(self.angles or self.rates or self.animation)
 
     def bone_pose(self, bone: Bone) -> Pose:
@@ -202,7 +202,9 @@ class Placement:
 
     @property
     def mass_centre(self) -> np.ndarray:
-        """Initial centre of mass (3,) m, doll's frame."""
+        """Centre of mass (3,) m at ``angles``, doll's frame. An animation is ignored: see
+        ``start``.
+        """
         return self._mean('position') if self.angles else self.doll.mass_centre
 
     @cached_property
@@ -212,7 +214,9 @@ class Placement:
         return start.bone_pose(self.doll.root), start.root_velocity()
 
     def root_velocity(self) -> np.ndarray:
-        """Initial velocity (3,) m/s of the root's centre of mass, world frame."""
+        """Initial velocity (3,) m/s of the root's centre of mass, world frame. An animation is
+        ignored: see root_motion.
+        """
         if self.fixed_root:
             return np.zeros(3)
         arm = rotation.rotate(self.orientation, self.doll.root.position - self.mass_centre)
@@ -272,8 +276,9 @@ def _started(placement: Placement, animation: Playback) -> Placement:
 
 
 def checked_angles(doll: Ragdoll, key: str, given: Mapping[str, float]) -> dict[str, float]:
-    """The ``given`` angles or rates, by the end of ``key``, rad or rad/s, rounded to 1e-9 degrees.
-    Raises UnknownJoint, NotFinite, and OutOfRange for angles outside their limits.
+    """Check the ``given`` joint angles, rad, or rates, rad/s, and round them to 1e-9 degrees.
+    ``key`` is their path in errors; it ends in 'angles' for angles. Raises UnknownJoint, NotFinite,
+    and OutOfRange for angles outside their limits.
     """
     limits = {name: pair for joint in doll.joints
               for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
@@ -410,7 +415,9 @@ class Scene:
 
     @cached_property
     def yielding_bones(self) -> np.ndarray:
-        """(n,) which bones forces move: no fixed roots, and none of what follows exactly."""
+        """(n,) bool: bones that forces can move, all but fixed roots and bodies that follow
+        exactly. Animations are ignored.
+        """
         yields = np.array([not placement.is_kinematic for placement in self.dolls])[
             self.doll_of_bone]
         for own, placement in zip(self.bone_slices, self.dolls, strict=True):
@@ -436,16 +443,16 @@ class Scene:
         return f'Scene {self.name!r}: {dolls}; {ground}{bodies}, tick {self.step:g} s'
 
     def touched_name(self, bone: int, body: int) -> str:
-        """Name of what is touched: a bone, a static body, or 'ground'; the index of what it is not
-        is negative.
+        """Name of what is touched: the bone of index ``bone``, or if that is negative the static
+        body of index ``body``, or 'ground' if both are negative.
         """
         if bone >= 0:
             return self.bone_names[bone]
         return self.bodies[body].name if body >= 0 else 'ground'
 
     def surface_stiffness(self, bone: int, body: int) -> float:
-        """Stiffness, N/m, of the surface that is touched, by indices as in touched_name(); of a
-        bone infinity: its tissue is of the contact law.
+        """Stiffness, N/m, of the surface that is touched, by indices as in touched_name(). Infinity
+        for a bone, whose tissue is part of the contact law.
         """
         if bone >= 0:
             return math.inf

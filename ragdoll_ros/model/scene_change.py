@@ -1,4 +1,6 @@
-"""SceneChange: dolls come and go; which doll, bone and angle of the scene before is which after."""
+"""SceneChange: the scenes before and after dolls come or go, and which doll, bone and angle of one
+is which of the other.
+"""
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -23,7 +23,8 @@ SEGMENTS = 20
 
 
 class Solid:
-    """Base of the primitive shapes; a Compound has the same properties and methods.
+    """Base of the primitive shapes; a Compound has the same properties and methods, except
+    turned_inertia().
 
     Each shape defines, in its own axes:
     - ``volume``, m^3, and ``half_extents``, m, half the edges of its bounding box
@@ -46,7 +47,9 @@ class Solid:
         raise NotImplementedError
 
     def turned_inertia(self, mass: float, axes: np.ndarray) -> np.ndarray:
-        """Inertia (3, 3) kg m^2 about its centre of mass, its own ``axes`` being the columns."""
+        """Inertia (3, 3) kg m^2 about its centre of mass, in the frame in which its own axes are
+        the columns of ``axes`` (3, 3).
+        """
         return axes * self.inertia(mass) @ axes.T
 
     @property
@@ -113,7 +116,9 @@ class Part:
 
     @property
     def size(self) -> Vector:
-        """(3,) m, edges of its bounding box."""
+        """(3,) m, edges of its shape's bounding box, in the shape's axes and centred at
+        its origin.
+        """
         return vector(2 * half for half in self.shape.half_extents)
 
     @property
@@ -124,7 +129,9 @@ class Part:
 
 @functools.lru_cache(4096)
 def _as_parts(shape: Shape) -> tuple[Part, ...]:
-    """One part. Cached: a batch of simulations asks for the same shapes many times."""
+    """A shape as its only part. Cached: a batch of simulations asks for the same shapes
+    many times.
+    """
     return (Part(shape),)
 
 

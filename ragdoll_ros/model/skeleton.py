@@ -47,11 +47,11 @@ class Appearance:
 class Skin:
     """A doll's skin in its bind pose, doll's frame.
 
-    Its joints are ``bones`` (b,), the doll's bones that have riders, and then ``links`` (l,), the
-    links of its swings that have riders, by their place among all of the doll. ``weights``
-    (v, b + l) are the joints' skin weights, ``positions`` (b + l, 3) m and ``orientations``
-    (b + l, 4) their poses that the skin is bound in: the doll's bind pose, unless a limb was moved
-    with its skin. Without ``appearance`` all of it has the ``color`` red, green, blue, opacity.
+    Its joints are ``bones`` (b,), indices of the doll's bones that have riders, and then ``links``
+    (l,), indices among all links of the doll of those that have riders. ``weights`` (v, b + l) are
+    the joints' skin weights; ``positions`` (b + l, 3) m and ``orientations`` (b + l, 4) are the
+    joints' poses in which the skin is bound: the doll's bind pose, unless a limb was moved with its
+    skin. Without ``appearance`` the whole skin has the ``color`` red, green, blue, opacity.
     """
 
     vertices: np.ndarray
@@ -134,6 +134,8 @@ class Riders:
 
 
 def links_of_riders(doll: Ragdoll) -> dict[str, int]:
-    """The link of each rider that one moves, by its place among all links of the doll."""
+    """Index, among all links of the doll, of the link that moves a rider, by the rider's name; only
+    of riders that a link moves.
+    """
     links = (link for swing in doll.swings for link in swing.links)
     return {name: number for number, link in enumerate(links) for name in link.riders}

@@ -80,8 +80,8 @@ class StaticBody:
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """Boxes, cylinders and spheres to draw, at their poses in the world frame; none of a
-        surface or a plane, which are drawn as meshes.
+        """Primitive shapes to draw, at their poses in the world frame: boxes, cylinders, spheres,
+        and the hulls of a Compound; none of a surface or a plane, which are drawn as meshes.
         """
         return tuple(Part.at(piece.shape, self.pose.compose(piece.pose))
                      for piece in self.shape.primitives)

@@ -1,5 +1,5 @@
-"""Checks of a surface: friction, restitution and color that a bone or a static body may have, and
-the stiffness of what is met.
+"""Checks of surface properties: friction, rolling friction, restitution and color, which a bone or
+a static body may have, and the stiffness of the ground or a static body.
 """
 from typing import Any
 

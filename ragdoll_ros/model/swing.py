@@ -1,12 +1,12 @@
 """A swing: a chain of point masses on massless rods, attached to a point of a bone.
 
-Frozen, validated data. SI units; points and directions are in the doll's frame, bind pose.
+Frozen, validated data. SI units; points and directions: doll's frame, bind pose.
 
 - ``stiffness`` k, N m/rad: the torque on a link is k times the angle to its rest direction. The
   first link's rest direction is fixed in the bone, each further one's in the link before it.
-- ``damping`` zeta, a ratio: the torque is -2 zeta J sqrt(k/J + gravity g/reach) times the angular
-  rate relative to the same frame, with J and reach as in physics/swing/chains.py (m l^2 and l for a
-  single mass). 1 is critical where gravity acts along the rest direction, overdamped elsewhere.
+- ``damping`` zeta, a ratio: the torque is -2 zeta J sqrt(k/J + |gravity| g/reach) times the angular
+  rate relative to the same frame; J and reach as in physics/swing/chains.py (m l^2 and l for one
+  mass). 1 is critical where gravity acts along the rest direction, overdamped elsewhere.
 - ``gravity``: factor of the scene's gravity; 0 for none, negative values rise.
 
 The masses have full inertia in the world frame: the bone's motion acts on them.
@@ -32,9 +32,9 @@ COLLIDER_RADIUS_RANGE = (1e-3, 1e3)
 class Link:
     """A massless rod of ``length`` m with a point ``mass`` (kg) at its end.
 
-    ``direction`` is its rest direction (doll's frame, bind pose); None: its swing's. ``riders``
-    are the names of those of the doll's riders that it moves, with their skin. ``radius`` m is that
-    of its mass for colliders.
+    ``direction`` is its rest direction (doll's frame, bind pose); None: its swing's. ``riders`` are
+    the names of the doll's riders that it moves, with their skin. ``radius`` m is that of its mass
+    in contact with colliders.
     """
 
     length: float
@@ -59,8 +59,9 @@ class Link:
 
 @dataclass(frozen=True)
 class Collider:
-    """A sphere about the point ``at``, m, or a capsule whose axis goes on from there to ``to``:
-    fixed to ``bone``, with a ``radius`` in m. Points are in the doll's frame, bind pose.
+    """A sphere about the point ``at``, m, or, with ``to``, a capsule around the segment from ``at``
+    to ``to``. It is fixed to ``bone``, with a ``radius`` in m. Points are in the doll's frame, bind
+    pose.
     """
 
     bone: str
@@ -126,12 +127,13 @@ class Swing:
 def strand(links: int, length: float, mass: float = 0.1,
            stiffness: float | tuple[float, float] = 0.0, damping: float = 0.0,
            rigidity: float | None = None) -> tuple[Link, ...]:
-    """``links`` equal links that share ``length`` m and ``mass`` kg.
+    """``links`` links of equal length that share ``length`` m and ``mass`` kg.
 
-    ``stiffness`` (N m/rad) is linear from root to tip; one number is both. Or ``rigidity`` E I
-    (N m^2) of a uniform strap that is clamped at its root: springs of E I links/length, but twice
-    that at the root; half a link's mass is the root's. The lowest frequency is then 5 % below the
-    strap's for 4 links, 1.3 % for 8.
+    ``stiffness`` (N m/rad) varies linearly from the root to the tip; one number is for all links.
+    Instead, ``rigidity`` E I (N m^2) is that of a uniform strap clamped at its root: the springs
+    are E I links/length, the first twice that; the last mass is half of the others, as half a
+    link's mass is at the root. The lowest frequency is then 5 % below the strap's for 4 links, 1.3
+    % for 8.
     """
     errors.check_range('links', links, 1, 1000)
     if rigidity is not None:

@@ -14,7 +14,9 @@ from .swing import Swing
 
 @dataclass(frozen=True)
 class MountedCollider:
-    """A collider on the bone of index ``bone``; both ends of its axis (2, 3) m in its frame."""
+    """A collider on the bone of index ``bone``; both ends of its axis (2, 3) m in the
+    bone's frame.
+    """
 
     bone: int
     axis: np.ndarray
@@ -36,7 +38,9 @@ class SwingMount:
 
     @classmethod
     def on(cls, swing: Swing, bone: Bone, index: int, name: str = '') -> SwingMount:
-        """Mount a swing on a doll's bone with this index in the state."""
+        """Mount a swing, without its colliders, on a doll's bone that has this index in
+        the state.
+        """
         back = rotation.inverse(np.array(bone.orientation))
         return cls(swing, index, name or swing.name, bone.pose.apply_inverse(swing.root),
                    rotation.rotate(back, np.array(swing.directions())))

@@ -28,9 +28,10 @@ class BadState:
 class Guard:
     """Advances a simulation, and undoes ticks that end in a diverged state.
 
-    A state has diverged if a number is not finite or exceeds BOUND, or if the energy of a cluster
-    rose in the tick by more than Engine.energy_error times its energy scale: kinetic energy before
-    the gain, plus that of dolls that fall by a third of their extent and move at SPEED.
+    A state has diverged if the norm of its numbers, or of the swings' positions, is not finite or
+    exceeds BOUND, or if the energy of a cluster rose in the tick, beyond all work, by more than
+    Engine.energy_error times its energy scale: kinetic energy before the gain, plus m (g extent / 3
+    + SPEED^2 / 2) of each of its dolls.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -92,7 +93,7 @@ class Guard:
 
 
 def sum_of_squares(numbers: np.ndarray) -> float:
-    """Sum of squares, without BLAS, whose threads spin for 0.1 s after each sum of a crowd's."""
+    """Sum of squares, without BLAS, whose threads spin for 0.1 s after each long sum."""
     flat = numbers.ravel()
     return float(np.einsum('i,i', flat, flat))
 

@@ -1,10 +1,10 @@
-"""Impacts, with the uncertainty that the length of the steps leaves in their figures.
+"""Impacts, and the uncertainty of their figures that is due to the length of the steps.
 
-A scene runs at its accuracy, and beside it with steps of half the length. Where errors are of order
-p, that of a figure is 2^p / (2^p - 1) times its difference from that of the finer run; a safety
-factor makes an uncertainty of it, as in the grid convergence index of two grids (Roache 1994,
-J Fluids Eng 116:405). A figure may be the same by chance in both runs: its difference counts as no
-less than that which the bones' motions, as the tick begins, make of it.
+A scene runs at the given accuracy, and beside it with steps of half the length. Where errors are of
+order p, the error of a figure is 2^p / (2^p - 1) times its difference between both runs. A safety
+factor makes an uncertainty of this error, as in the grid convergence index of two grids (Roache
+1994, J Fluids Eng 116:405). A figure may be the same in both runs by chance: its difference counts
+as no less than what follows from the difference of the bones' motions as the tick begins.
 """
 from __future__ import annotations
 
@@ -60,8 +60,9 @@ Act = Callable[[Simulation], object]
 
 @dataclass(frozen=True)
 class ImpactUncertainty:
-    """Uncertainties of the figures of an impact, in their units, the time's in s. NaN: unknown, as
-    the impact has no partner, or its speed is uncertain by all of it, so that it may not happen.
+    """Uncertainties of the figures of an impact, in their units, the time's in s. NaN: unknown. The
+    impact has no partner, its speed is not known to be above 0, so that it may not happen, or the
+    impact itself lacks the figure.
     """
 
     time: float = math.nan
@@ -105,7 +106,7 @@ def impacts_with_uncertainty(
 
     Args:
         scene: what to simulate.
-        duration: s, rounded to ticks.
+        duration: s, from the scene's tick to 3600, rounded to ticks.
         limits: as of Simulation.record_impacts().
         act: called with each of both simulations before each of its ticks, to push, hold or drive;
             what it does must follow from the simulation that it gets.
@@ -115,7 +116,7 @@ def impacts_with_uncertainty(
         The impacts of the run at ``accuracy``, each with its uncertainties.
 
     Raises:
-        OutOfRange: duration is not above 0, or accuracy is none.
+        OutOfRange: duration is out of its range, or accuracy is none.
 
     Example:
         >>> found = impacts_with_uncertainty(load_scene('man_faints'), 0.6, load_limits())
@@ -153,7 +154,9 @@ def impacts_with_uncertainty(
 
 
 def halved(accuracy: Accuracy, tick: float) -> Accuracy:
-    """An accuracy with twice as many steps in a tick, s, with and without contacts."""
+    """An accuracy with twice as many steps in contact in a tick, s, a quarter of the solve_error,
+    and the flight_error of steps half as long, but not below that of EXACT.
+    """
     count = math.ceil(tick / accuracy.step - 1e-9)
     return dataclasses.replace(
         accuracy, step=tick / (2 * count), solve_error=accuracy.solve_error / 4,
@@ -162,9 +165,10 @@ def halved(accuracy: Accuracy, tick: float) -> Accuracy:
 
 
 def partners_of(impacts: Sequence[Impact], others: Sequence[Impact]) -> list[Impact | None]:
-    """Of each impact the most similar one of ``others`` with the same bone and the same other side,
-    if neither has a more similar one: by time, in WINDOW, and by the logarithm of the speed. An
-    impact and the small ones that follow it at once keep apart. None where that is above 1.
+    """Partner of each impact: the most similar one of ``others`` with the same bone and the same
+    other side, if neither has a more similar one. Similarity is by the difference in time, over
+    WINDOW, and in the logarithm of the speed, so that small impacts that follow another at once are
+    told from it. None where the norm of both is above 1.
     """
     places: dict[tuple[str, str, str], tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
     for side, found in enumerate((impacts, others)):
@@ -186,12 +190,12 @@ def partners_of(impacts: Sequence[Impact], others: Sequence[Impact]) -> list[Imp
 
 def uncertainty_of(hit: Impact, finer: Impact | None, touching: float = TOUCHING,
                    place: float = 0.0, velocity: float = 0.0) -> ImpactUncertainty:
-    """Uncertainties of the figures of an impact by its partner; they are unknown without one, and
-    where the speed is not known to be above 0.
+    """Uncertainties of the figures of an impact, from its partner in the finer run; unknown without
+    one, and where the speed is not known to be above 0.
 
-    ``place``, m, and ``velocity``, m/s, by which the motions of both runs differ where it meets,
-    are what times and speeds differ by at least, and so what follows from them. ``touching``, m: an
-    impact is early by that at most.
+    ``place``, m, and ``velocity``, m/s: differences of the motions of both runs where it meets.
+    Differences of the figures count as no less than what follows from these two. ``touching``, m:
+    distance by which the impact is found early, at most.
     """
     if finer is None:
         return ImpactUncertainty()
@@ -219,7 +223,7 @@ class Deviation:
 
     @classmethod
     def between(cls, a: State, b: State) -> Deviation:
-        """Of two states."""
+        """Deviation between two states."""
         return cls(
             np.linalg.norm(a.positions - b.positions, axis=1)
             + LEVER * rotation.angle_between(a.orientations, b.orientations),
@@ -227,7 +231,7 @@ class Deviation:
             + LEVER * np.linalg.norm(a.angular_velocities - b.angular_velocities, axis=1))
 
     def of(self, scene: Scene, hit: Impact) -> tuple[float, float]:
-        """The larger ones, m and m/s, of the one or two bones of an impact."""
+        """Deviation, m and m/s, of an impact: the larger one of its one or two bones."""
         bones = [scene.bone_index(name) for name in (hit.bone, hit.against)
                  if name in scene.bone_names]
         return float(self.places[bones].max()), float(self.velocities[bones].max())

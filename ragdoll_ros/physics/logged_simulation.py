@@ -1,9 +1,10 @@
 """LoggedSimulation reports each action as an event; apply_event repeats one.
 
-An event is the name of a Simulation method or property and its arguments as numbers, texts and
-lists; that of ``add`` is a Placement. The caller of advance() counts the ticks between events. The
-same scene and the same events at the same ticks give the same states to the bit. Event names are
-part of the log format: they do not change with the names in the code.
+An event has a name, mostly that of a Simulation method or property, and arguments as numbers,
+texts, lists and mappings; that of ``add`` is a Placement. The event ``limp`` is for information and
+not repeated. The caller of advance() counts the ticks between events. The same scene and the same
+events at the same ticks give the same states to the bit. Event names are part of the log format:
+they do not change with the names in the code.
 """
 import dataclasses
 import hashlib
@@ -173,7 +174,9 @@ class LoggedSimulation(Simulation):
 
 
 def apply_event(simulation: Simulation, name: str, arguments: dict) -> None:
-    """Repeat a logged action; WrongForm for an unknown event, else what the action raises."""
+    """Repeat a logged action. Raises WrongForm for an unknown event or wrong arguments, else what
+    the action raises.
+    """
     try:
         _ACTIONS[name](simulation, **arguments)
     except errors.RagdollError:
@@ -200,7 +203,7 @@ def state_digest(state: State) -> str:
 
 
 def _call_of(method: str) -> Callable[..., object]:
-    """What calls a method of Simulation with the arguments of an event."""
+    """Make a function that calls a method of Simulation with the arguments of an event."""
     def call(simulation: Simulation, **arguments: object) -> object:
         return getattr(simulation, method)(**arguments)
     return call

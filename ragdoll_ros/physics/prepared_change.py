@@ -1,4 +1,4 @@
-"""PreparedChange: what a change of dolls needs that no state determines, made before it."""
+"""PreparedChange: the parts of a change of dolls that need no state, made before the change."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PreparedChange:
-    """A change of a simulation's dolls, and what simulates the scene after it, at its start."""
+    """A change of a simulation's dolls, and all that simulates the scene after the change, at the
+    start of that scene.
+    """
 
     change: SceneChange
     placed: GeneralizedState | None

@@ -16,9 +16,9 @@ from ..model.vectors import Quaternion
 
 
 def damping_rate(scene: Scene) -> float:
-    """Upper bound on the decay rate c / I, 1/s, of the joints' damping c.
+    """Largest decay rate c / I, 1/s, of the joints' damping c, by an estimate of I.
 
-    I is the reduced inertia of parent and child about a joint's axis; the bound takes both about
+    I is the reduced inertia of parent and child about a joint's axis; the estimate takes both about
     their own centres of mass: 1/I = 1/Ia + 1/Ib.
     """
     fastest = 0.0
@@ -91,7 +91,7 @@ def _parts(doll: Ragdoll) -> tuple[np.ndarray, ...]:
 
 
 def _support_rows(part: Part) -> Iterator[tuple[Sequence[float], Sequence[float], Quaternion]]:
-    """Terms of support_distance, position and orientation of a part; of a hull of each vertex."""
+    """Support terms, position and orientation of a part; of a hull, those of each vertex."""
     if isinstance(part.shape, Hull):
         for vertex in part.pose.apply(part.shape.vertices):
             yield (0.0,) * 6, vertex, IDENTITY

@@ -72,8 +72,8 @@ class Simulation:
     Raises:
         OutOfRange: step, accuracy, engine or workers is not valid.
         MissingEngine: the engine's library is not installed or does not work.
-        WrongForm: a joint has passive torques, or a body follows or is a mesh or a height field,
-            and the engine is not rigid.
+        WrongForm: the engine is not rigid, and a joint has passive torques, a doll has motors or a
+            fixed root, a body follows, or a shape is a mesh, a height field or a hull.
 
     Example:
         >>> from ragdoll_ros import Push, Simulation, load_scene
@@ -178,7 +178,7 @@ class Simulation:
 
     @property
     def capabilities(self) -> frozenset[Capability]:
-        """What the engine can beyond what all engines can."""
+        """What the engine can do beyond what all engines can do."""
         return self._engine.capabilities
 
     @property
@@ -193,7 +193,7 @@ class Simulation:
 
     @property
     def work(self) -> tuple[float, float]:
-        """Work of pushes and of hands since the start, J."""
+        """Work since the start, J: of pushes, and of hands and joint springs."""
         return self._engine.work
 
     @property
@@ -238,8 +238,9 @@ class Simulation:
 
     @property
     def initial_overlaps(self) -> tuple[Overlap, ...]:
-        """What overlaps at the start by more than 1 mm, the deepest first; computed when it is
-        first read. Raises WrongForm: the engine is not rigid.
+        """What overlaps at the start by more than 1 mm, the deepest first, except bones of a doll
+        that overlap as deep at joint angles of zero; computed when it is first read. Raises
+        WrongForm: the engine is not rigid.
         """
         if self._overlaps is None:
             self._require(Capability.OVERLAPS)
@@ -277,8 +278,8 @@ class Simulation:
 
     @property
     def dropped_impacts(self) -> int:
-        """Number of impacts since record_impacts() that are in no tick's ``impacts``: there are at
-        most eight a bone and tick.
+        """Number of impacts since record_impacts() that are in no tick's ``impacts``, as a log was
+        full: that of a cluster has room for eight a bone in each call of Engine.advance().
         """
         return self._recorded_impacts().dropped
 
@@ -333,12 +334,14 @@ class Simulation:
         until the next call, or for 0.2 s of simulated time. Then it stands, and is one of
         ``stale_bodies``.
 
-        What follows exactly is at the end of the next tick where pose and twist, or angles and
-        rates, take it. A pose, or a link's, farther away than 10 m/s explain in a tick places the
-        body there, without a blow, and is counted. Work on dolls is work of pushes.
+        A body that follows exactly is at the end of the next tick where pose and twist, or angles
+        and rates, take it. If a pose, or that of a link, is too far away to be reached in a tick at
+        10 m/s, the body jumps: it is placed there, without an impact. Jumps are counted, but not
+        that of the first pose. Work on dolls is work of pushes.
 
-        Joints that are not named, and the frame where joints alone are, go on as they were told,
-        until 0.2 s after that. Limits of joints are not checked: who moves the robot keeps them.
+        Joints that are not named continue their motions, until 0.2 s after their last command; so
+        does the frame where only joints are given. Limits of joints are not checked: the caller
+        keeps them.
 
         Args:
             name: of the body or the robot.
@@ -346,10 +349,10 @@ class Simulation:
                 where it is.
             twist: (6,) world frame: velocity of the frame's origin, m/s, angular velocity, rad/s;
                 None: at rest.
-            joint_angles: of a robot: rad, or m of joints that slide, by the names of its joints; of
-                those that are in ``rates`` alone: from where they are. What mimics another may be
-                named, and follows that.
-            rates: rad/s or m/s; of those that are in ``joint_angles`` alone: zero.
+            joint_angles: of a robot: rad, or m of joints that slide, by the names of its joints;
+                those in ``rates`` alone start from where they are. A joint that mimics another may
+                be named, but follows that one.
+            rates: rad/s or m/s; zero for those in ``joint_angles`` alone.
 
         Raises:
             UnknownDoll: the scene has no such body with `follow`, and no such robot.
@@ -369,8 +372,8 @@ class Simulation:
 
     @property
     def stale_bodies(self) -> tuple[str, ...]:
-        """Names of bodies with `follow` that drive_body() has not moved for 0.2 s; of a robot, if
-        one of what it had moved, its frame or a joint, it has not since.
+        """Names of bodies with `follow` that drive_body() has not moved for 0.2 s, or never; of a
+        robot, if its frame or a joint that was moved before has not been moved for 0.2 s.
         """
         return self._driven.stale(self.time)
 
@@ -445,9 +448,10 @@ class Simulation:
         """Set targets of joint springs, those of motors or of hold(); others stay.
 
         Args:
-            joint_angles: rad, by Scene.angle_names; of an angle in ``rates`` alone it stays.
+            joint_angles: rad, by Scene.angle_names; a target in ``rates`` alone moves on from where
+                it is.
             rates: rad/s, at which the targets move on for 0.2 s, then they stand; 0 where none is
-                given. The damping is relative to it.
+                given. Damping is relative to this rate.
 
         Raises:
             UnknownJoint: the scene has no such angle.
@@ -575,10 +579,11 @@ class Simulation:
     def place(self, coordinates: GeneralizedState) -> State:
         """Set pose and velocities of all dolls, for now and for later resets, and reset().
 
-        Animations do not begin any more. Collision is disabled between bones of a doll that overlap
-        there by more than allowed_penetration(); a doll that is deeper in the ground is lifted onto
-        it. Raises
-        OutOfRange for lengths other than the scene's, NotFinite, NotUnit for orientations.
+        Animations do not begin any more. With engine rigid, bones of a doll that overlap here and
+        also as the doll is placed in the scene do not collide until they separate; other engines
+        disable collision for good between those that overlap here by more than
+        allowed_penetration(). A doll that is deeper in the ground than that is lifted onto it.
+        Raises OutOfRange for lengths other than the scene's, NotFinite, NotUnit for orientations.
 
         >>> simulation.place(simulation.coordinates) is simulation.state
         True
@@ -607,8 +612,8 @@ class Simulation:
 
         Simulated time continues, and other dolls go on as before. The change of energy counts as
         work of pushes. A doll that would be deep in the ground is lifted onto it. Its bones that
-        overlap at new angles do not collide until they separate. If it has swings, all swings
-        restart at rest.
+        overlap at new angles do not collide until they separate; with other engines than rigid,
+        never again. If it has swings, all swings restart at rest.
 
         Args:
             doll: name of its placement in the scene.
@@ -664,8 +669,8 @@ class Simulation:
 
         Simulated time continues. Other dolls keep their states to the bit, and their pushes, grabs,
         joint springs and swings. The doll's energy is added to that at the start: energy_excess and
-        work stay. reset() restores the start of the new scene. Bones and angles are named doll/bone
-        from the second doll on. Only the rigid engine adds and removes dolls.
+        work stay. reset() restores the start of the new scene. With two dolls or more, all bones
+        and angles are named doll/bone. Only the rigid engine adds and removes dolls.
 
         Raises:
             DuplicateName: a doll or body of the scene has its name.
@@ -689,8 +694,8 @@ class Simulation:
         return self.carry_out(self.prepare_remove(doll))
 
     def prepare_add(self, placements: Sequence[Placement]) -> PreparedChange:
-        """Prepare to add dolls, for carry_out(): most of the work, which may be done in a thread
-        while this one calls advance(). Raises what add() raises.
+        """Prepare to add dolls, for carry_out(). This is most of the work, and may be done in
+        another thread while the simulation advances. Raises what add() raises.
         """
         dolls = list(self.scene.dolls)
         for placement in placements:
@@ -705,7 +710,7 @@ class Simulation:
         return self._prepare_dolls(self.scene.dolls[:index] + self.scene.dolls[index + 1:])
 
     def carry_out(self, prepared: PreparedChange) -> State:
-        """Go on with other dolls: those that stay in the states that they have, to the bit.
+        """Carry out a prepared change of dolls; those that stay keep their states to the bit.
 
         Raises:
             WrongForm: other dolls have come or gone since it was prepared.
@@ -755,7 +760,8 @@ class Simulation:
         return self.state
 
     def reset(self, keep_time: bool = False) -> State:
-        """Restore and return the initial state, to the bit; ends all pushes, grabs and springs.
+        """Restore and return the initial state, to the bit. Ends all pushes, grabs and springs of
+        hold(); motors and animations begin anew, the latter not after place().
 
         Args:
             keep_time: whether simulated time continues; else it is 0 again.
@@ -782,7 +788,8 @@ class Simulation:
         return self.state
 
     def measures(self) -> dict[str, float]:
-        """Error measures since the start, and costs of the last tick; keys end in units.
+        """Error measures and counters, of now or since the start; keys end in units. See
+        docs/accuracy_explained.md.
 
         >>> simulation.measures()['joint_gap_m'] < 1e-3
         True
@@ -826,7 +833,9 @@ class Simulation:
 
     def _with_given(self, doll: int, key: str, given: Mapping[str, float],
                     values: np.ndarray) -> np.ndarray:
-        """Angles or rates (k,) of all dolls with those of a doll that are given by its names."""
+        """Replace in ``values`` (k,), angles or rates of all dolls, those that are ``given`` for a
+        doll by its own names; returns ``values``.
+        """
         placement = self.scene.dolls[doll]
         names = self.scene.angle_names
         for name, value in checked_angles(placement.doll, key, given).items():
@@ -913,7 +922,7 @@ class Simulation:
             self._release(self._animations.due(end), 'limp_at')
 
     def _release(self, dolls: Sequence[int], reason: str) -> None:
-        """Let those of ``dolls`` go limp that are animated."""
+        """Let the animated ones of ``dolls`` go limp, and remove the springs of their joints."""
         animated = [doll for doll in dolls if doll in self._animations.dolls]
         if animated:
             self._animations.release(self._engine, animated, self.time)
@@ -955,8 +964,9 @@ class Simulation:
             self.asleep = bool(self._engine.sleeping.all())
 
     def _disturb_unstable(self, dolls: np.ndarray) -> np.ndarray:
-        """Which of ``dolls`` (d,) that are about to sleep do not rest in a stable equilibrium; if
-        it is an unstable one, disturb them. Those watched since an earlier test do rest.
+        """Which of ``dolls`` (d,) that are about to sleep do not rest in a stable equilibrium.
+        Disturb those in an unstable one, and watch all of them. Clusters that were watched since an
+        earlier test do rest.
         """
         engine, detector = self._engine, self._sleep_detector
         clusters = engine.cluster_of_doll
@@ -973,7 +983,9 @@ class Simulation:
 
     @property
     def _resting(self) -> np.ndarray:
-        """(n,) bones that the ground bears: those that yield and are not animated."""
+        """(n,) bones that the ground bears: those that yield, but not of animated dolls without
+        motors.
+        """
         if not self._animations:
             return self.scene.yielding_bones
         animated = np.isin(self.scene.doll_of_bone, self._animations.kinematic)

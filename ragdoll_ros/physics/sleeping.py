@@ -88,16 +88,18 @@ class SleepDetector:
 
     def watch(self, dolls: np.ndarray, durations: np.ndarray,
               kinetic: np.ndarray) -> None:
-        """Restart the timers of dolls (d,) that seem not to rest. If they are still for
-        ``durations`` (d,) s and then not faster than now, by ``kinetic`` (d,) J, they do.
+        """Restart the timers of dolls (d,) that seem not to rest. They do rest if they are still
+        for ``durations`` (d,) s and their kinetic energy is then at most that of
+        _grown(``kinetic``), J.
         """
         self._still[dolls], self.watched[dolls] = 0, True
         self._wait[dolls] = np.maximum(self._time, durations[dolls] * SECOND)
         self._bound[dolls] = self._grown(kinetic)[dolls]
 
     def all_move(self, engine: Engine, driven: list[int]) -> bool:
-        """Whether no doll can be still, by its kinetic energy, or as its bone is ``driven``; if so,
-        restarts all timers. For one doll in motion a third of what find_ready() costs.
+        """Whether no doll can be still, by its kinetic energy, as its bone is ``driven``, or
+        without gravity; if so, restarts all timers. For one doll in motion a third of the cost of
+        find_ready().
         """
         still = engine.doll_totals.kinetic <= self.max_kinetic
         if driven:
@@ -153,5 +155,5 @@ class SleepDetector:
         return ready & ~crept & ~faster
 
     def _grown(self, kinetic: np.ndarray) -> np.ndarray:
-        """Kinetic energies (d,) J of dolls that have become faster, from ``kinetic`` (d,)."""
+        """Energies (d,) J above which dolls count as faster than with ``kinetic`` (d,) J."""
         return ACCELERATION ** 2 * np.maximum(kinetic, self._masses * SOLVED ** 2 / 2)

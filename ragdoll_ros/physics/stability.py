@@ -1,11 +1,11 @@
 """StabilityTest: whether dolls that are about to fall asleep rest in a stable equilibrium.
 
-In a stable equilibrium potential energy has a minimum, so that a disturbance never grows: in the
-norm of the kinetic energy, |v| = sqrt(2 T), the velocities v of a copy that starts with velocities
-d stay within those of a copy that starts at rest, by at most |d| (Lagrange and Dirichlet). Friction
-and impacts, which only take energy, do not change that. In an unstable one the difference grows as
-exp(t / tau), for a rod of length l on its end tau = sqrt(2 l / 3 g), for most of that height
-faster. The copy at rest also tells what creeps: it sets itself in motion, ever faster.
+In a stable equilibrium potential energy has a minimum, so that a disturbance never grows (Lagrange
+and Dirichlet): if one copy starts with velocities d and one at rest, the difference of their
+velocities stays within |d|, in the norm of the kinetic energy, |v| = sqrt(2 T). Friction and
+impacts, which only take energy, do not change that. In an unstable equilibrium the difference grows
+as exp(t / tau); for a rod of length l on its end tau = sqrt(2 l / 3 g), and most bodies of that
+height are faster. The copy at rest also shows what creeps: it sets itself in motion, ever faster.
 """
 from __future__ import annotations
 
@@ -75,16 +75,17 @@ class StabilityTest:
             self._doll_of_v[own] = doll
 
     def durations(self, clusters: np.ndarray) -> np.ndarray:
-        """Simulated time (d,) s in which what is not stable departs: by the largest doll of each
-        one's cluster, ``clusters`` (d,).
+        """Simulated time (d,) s in which a doll departs if it is unstable: DURATION tau of the
+        largest doll of its cluster, ``clusters`` (d,).
         """
         longest = np.zeros(len(clusters))
         np.maximum.at(longest, clusters, self._durations)
         return longest[clusters]
 
     def judge(self, engine: Engine, dolls: np.ndarray, still: np.ndarray) -> RestVerdict:
-        """Test ``dolls`` (d,), whole clusters, which stay as they are. A copy whose cluster exceeds
-        its kinetic energy ``still`` (d,) J is in motion, and ends. There must be gravity.
+        """Test ``dolls`` (d,), whole clusters, which stay as they are. If the kinetic energy of the
+        copy of a cluster exceeds the sum of ``still`` (d,) J, the copy is in motion and its test
+        ends. There must be gravity.
         """
         durations = self.durations(engine.cluster_of_doll)
         verdict = RestVerdict(np.zeros_like(dolls), np.zeros_like(dolls),
@@ -119,10 +120,11 @@ class StabilityTest:
 
     def _simulate(self, engine: Engine, dolls: np.ndarray, start: tuple[np.ndarray, float],
                   at_rest: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """|v| (SAMPLES + 1, c) of the clusters of copies that ``start`` with velocities, at
-        intervals, s; and which (c,) exceed GROWTH (``at_rest`` + |d|), |d| that of the start, and
-        still grow. Ends as soon as each does, exceeds ``limit`` (c,), or is at rest. The first
-        interval, in which gaps of some um close, does not count.
+        """Simulate copies of ``dolls``; ``start``: their velocities, and an interval, s. Returns
+        |v| (SAMPLES + 1, c) of their clusters at the start and after each interval, and which (c,)
+        exceed GROWTH (``at_rest`` + |d|), |d| that of the start, and still grow. Ends as soon as
+        each does, exceeds ``limit`` (c,), or is at rest. What exceeds it in the first interval, in
+        which gaps of some um close, does not count.
         """
         velocities, interval = start
         clusters = engine.cluster_of_doll
@@ -154,7 +156,7 @@ class StabilityTest:
 
 
 def disturbance(placement: Placement, count: int) -> np.ndarray:
-    """Velocities (count,) within DISTURBANCE by a hash of the doll's place in the scene.
+    """Velocities (count,) within DISTURBANCE by a hash of the doll's initial pose.
 
     So a doll has the same in any process, after a reset, and alone.
     """

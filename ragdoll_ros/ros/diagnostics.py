@@ -38,7 +38,7 @@ class Diagnostics:
     """Measures the cost of ticks; reports real-time factor, cost, error measures and counters.
 
     ``node_values()``: values of the node to report, by key; ``stamp()``: stamp of a report, ns;
-    ``bodies``: what is driven, which topics move it, and what none does.
+    ``bodies``: the subscriptions for driven bodies, whose silence a report warns of.
     """
 
     def __init__(self, node: Node, steady: Clock, counts: InputCounts,
@@ -56,7 +56,9 @@ class Diagnostics:
         node.create_timer(PERIOD, self._on_timer, clock=steady)
 
     def record_tick(self, cost: int, lag: float, simulated: int) -> None:
-        """Record a tick, ns: wall time spent, lag of the start behind its due time, simulated."""
+        """Record a tick. All in ns: ``cost``, the wall time spent; ``lag`` of the start behind its
+        due time; ``simulated``, the simulated time.
+        """
         self._ticks += 1
         self._cost += cost
         self._max_cost = max(self._max_cost, cost)
@@ -65,7 +67,9 @@ class Diagnostics:
         self._simulated += simulated
 
     def publish(self) -> None:
-        """Publish a report if there is a subscriber; rates are those of the last full period."""
+        """Publish a report if there is a subscriber and a first period has ended; rates are those
+        of the last full period.
+        """
         if self._last is None or not self._publisher.get_subscription_count():
             return
         level, message = self._level_and_message()
@@ -98,8 +102,9 @@ class Diagnostics:
         self._lag = self._max_lag = 0.0
 
     def _level_and_message(self) -> tuple[bytes, str]:
-        """ERROR for bad states, WARN for refused input or lag since the last report and for driven
-        bodies that nothing moves, else OK.
+        """Return the level and its message. ERROR: bad states since the last report. WARN: refused
+        or clamped input since then, lag, other nodes of this name, an unheard publisher on cmd_vel,
+        or driven bodies that nothing moves. Else OK.
         """
         counts, values = self._counts, self._node_values()
         requested = 0.0 if values['paused'] else values['real_time_factor']
@@ -164,9 +169,9 @@ class DuplicateNodes:
     """Counts other nodes with the name and namespace of ``node``, and warns of new ones: their
     messages mix with this node's, and ROS does not report it.
 
-    A node is known by its service ~/get_parameters. The list of node names would do, but a node
-    that ends may stay in it: rmw_dds_common's GraphCache adds a participant with each message of
-    its entities, also with one that is read after the participant has gone.
+    A node is known by its service ~/get_parameters. The list of node names is not used, as a node
+    that has ended may stay in it: rmw_dds_common's GraphCache adds a participant with each message
+    of its entities, also with one that is read after the participant has gone.
     """
 
     def __init__(self, node: Node) -> None:
@@ -196,7 +201,9 @@ def pushes_text(pushes: Sequence[Push]) -> str:
 
 
 def overlaps_text(simulation: Simulation) -> str:
-    """The deepest initial overlaps in words; 'none'; 'unknown' by engines that do not find them."""
+    """Return the deepest initial overlaps as text: 'none' if there are none, 'unknown' if the
+    engine does not find them.
+    """
     if Capability.OVERLAPS not in simulation.capabilities:
         return 'unknown'
     found = simulation.initial_overlaps

@@ -3,17 +3,17 @@
 An event is a JSON object in a String. ``number`` counts events since the node's start, so a gap
 shows; ``tick`` is the number of ticks made before it; the other fields depend on ``kind``:
 
-- start: a new simulation: SHA-256 of its scene, engine, accuracy, step in s, and SHA-256 of its
-  first state as ``state``
+- start: a new simulation: SHA-256 of its scene, engine, accuracy, step in s, samples per tick as
+  ``parts``, and SHA-256 of its first state as ``state``
 - reset: the simulation is back at its start; the same fields without the state, and ``keep_time``
   if simulated time continues
-- push, drive, release, grab, drag, let_go, drive_body, set_state, remove, step, accuracy, go_back:
-  a call of the simulation (physics/logged_simulation.py) with its arguments
-- add: likewise; ``placement`` is YAML, as a scene of the doll alone
+- push, drive, release, grab, drag, let_go, drive_body, set_state, set_pose_target, set_strength,
+  go_limp, remove, step, parts, accuracy, go_back: a call of the simulation
+  (physics/logged_simulation.py) with its arguments
+- add: such a call; ``placement`` is YAML, a scene of this doll alone
 - state: ``sha256`` of the state, every HASH_INTERVAL ticks, while there is a subscriber
 - unload: the end of the world; no ticks are made until the next start
-- go_limp: likewise; limp: which dolls went limp from their animations at which time, s, and why;
-  for information
+- limp: for information: which dolls went limp from their animations, when, s, and why
 - pause, parameters: for information; their effects on the simulation are events of their own
 
 Floats are written so that they are read back to the same bits.
@@ -58,13 +58,15 @@ class EventLog:
         self._number = self._tick = 0
 
     def prepare(self, scene: Scene) -> RunScene:
-        """What is published of a scene; this may run beside the ticks."""
+        """Return the text of a scene and its digest, for set_simulation(). This may run beside the
+        ticks.
+        """
         self._texts.keep(scene)
         text = run_scene_text(scene, self._texts)
         return RunScene(text, scene_digest(text))
 
     def set_simulation(self, simulation: LoggedSimulation, prepared: RunScene) -> None:
-        """Log this simulation from now on, and publish its scene if that is another one."""
+        """Log this simulation from now on. Publish its scene unless that was published last."""
         if simulation.scene is not self._scene:
             self._scene, self._digest = simulation.scene, prepared.digest
             self._scenes.publish(String(data=prepared.text))

@@ -42,16 +42,17 @@ def overridable_publisher(node: Node, kind: type, name: str, qos: QoSProfile | i
 
 
 def has_subscribers(publisher: Publisher) -> bool:
-    """Whether anybody listens. It is asked of ten publishers each tick: rclpy's method takes three
-    times as long, as it guards against a destruction by another thread.
+    """Whether anybody listens. This is asked of ten publishers each tick, and rclpy's method takes
+    three times as long, as it guards against a destruction by another thread.
     """
     return publisher.handle.get_subscription_count() > 0
 
 
 class LatchedTopic:
-    """Publishes ``kind`` on ``name`` while there are subscribers; late ones get the last messages.
+    """A publisher of ``kind`` on ``name`` from which late subscribers get the last messages.
 
-    What was published before they left would be old for the next one: it is forgotten.
+    To be used while there are subscribers; else forget() is to be called, as old messages would be
+    wrong for the next subscriber.
     """
 
     def __init__(self, node: Node, kind: type, name: str, qos: QoSProfile = TICK_HISTORY) -> None:

@@ -19,8 +19,8 @@ MOST_DRIVEN = 3
 
 def start_line(simulation: Simulation, settings: NodeSettings, node: Node,
                moved_by: Mapping[str, Sequence[str]]) -> str:
-    """Scene, engine, with the reason if it is not the requested one, accuracy and topics;
-    ``moved_by``: those that move bodies and robots, by their names.
+    """Scene, engine, with the reason if it is not the requested one, accuracy and topics.
+    ``moved_by``: topics that move bodies and robots, by the names of these.
     """
     scene, reason = simulation.scene, simulation.engine_reason
     dolls = [placement.doll for placement in scene.dolls if placement.follow is None]

@@ -188,12 +188,12 @@ class RagdollNode(Node):
         self._publish_start()
 
     def run_beside(self, make: Callable[[], Result]) -> Result:
-        """What ``make`` returns, which runs in a thread while the ticks go on."""
+        """Run ``make`` in a thread while the ticks go on, and return what it returns."""
         return self.ticker.run_beside(make)
 
     def change_dolls(self, prepare: Callable[[Simulation], PreparedChange]) -> None:
-        """Add or remove dolls as ``prepare(simulation)`` says, beside the ticks; time goes on,
-        topics and parameters follow. Raises what it raises.
+        """Add or remove dolls as ``prepare(simulation)`` says, which runs beside the ticks. Time
+        goes on; topics and parameters follow. Raises what ``prepare`` raises.
         """
         def prepared() -> tuple[Simulation, PreparedChange, PreparedScene]:
             simulation = self.simulation
@@ -209,14 +209,14 @@ class RagdollNode(Node):
         self._show_if_paused()
 
     def load_world(self, name: str) -> LoadedWorld:
-        """The scene that a value of the parameter `scene` names, for use_world(). This may run
-        beside the ticks of the present one. Raises a RagdollError.
+        """Load the scene that a value of the parameter `scene` names, and make its simulation, for
+        use_world(). This may run beside the ticks of the present one. Raises a RagdollError.
         """
         scene = load_scene(name)
         return self._made_world(scene, self._node_parameters.with_scene(name, scene))
 
     def use_world(self, loaded: LoadedWorld) -> SetParametersResult:
-        """Set the parameter `scene` to what has been loaded: it replaces the present one."""
+        """Set the parameter `scene` to that of the loaded world, which replaces the present one."""
         self._loaded = loaded
         done = self.set_parameters_atomically([Parameter('scene', value=loaded.settings.scene)])
         if self._loaded is not None:  # refused before it was looked at
@@ -308,8 +308,8 @@ class RagdollNode(Node):
             self._publish()
 
     def _publish_start(self) -> None:
-        """Publish after a reset or new scene, /diagnostics, which maps stamps to time, first;
-        restart ticks.
+        """Publish the state after a reset or a new scene, and restart the ticks. /diagnostics,
+        which maps stamps to time, comes first.
         """
         self._stamps.advance()
         self._diagnostics.publish()
@@ -366,7 +366,7 @@ class RagdollNode(Node):
         self._set_simulation(simulation, prepared)
 
     def _load(self, name: str) -> Scene:
-        """Load a scene, beside the ticks of the present one, unless that has been done."""
+        """Load a scene beside the ticks of the present one, unless load_world() has loaded it."""
         if self._loaded is not None and self._loaded.settings.scene == name:
             return self._loaded.scene
         return self.run_beside(lambda: load_scene(name))

@@ -42,7 +42,7 @@ MARKER_PERIOD = 33_000_000
 
 
 class PreparedOutputs(NamedTuple):
-    """What is published of a scene as a whole, and the templates of what is published of states."""
+    """What is published once for a scene, and the templates of the messages of its states."""
 
     description: str
     """Of robot_description."""
@@ -82,7 +82,7 @@ class Outputs:
 
     def prepare(self, scene: Scene, frame: str, publish_tf: str,
                 text: str = '') -> PreparedOutputs:
-        """What set_scene() takes; ``text``: on ~/scene. This may run beside the ticks."""
+        """Make what set_scene() takes. ``text``: that on ~/scene. This may run beside the ticks."""
         self._urdf_trees.keep(placement.doll for placement in scene.dolls)
         description = scene_to_urdf(scene, frame, self._urdf_trees)
         templates = SceneTemplates(scene, frame)
@@ -133,7 +133,9 @@ class Outputs:
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether a topic that is published with each tick has a subscriber."""
+        """Whether somebody receives messages of each tick: a topic other than ~/markers has a
+        subscriber, or /clock is published.
+        """
         return (self._clock is not None
                 or any(topic is not None and topic.has_subscribers
                        for topic in (self._measures, self._poses, self._swings))
@@ -146,12 +148,12 @@ class Outputs:
         return not self._joints_move and has_subscribers(self._joints)
 
     def publish(self, simulation: Simulation, stamp: int, now: int, paused: bool = False) -> None:
-        """Publish the simulation's state with ``stamp``, ns, on topics with subscribers, markers at
-        most every MARKER_PERIOD by ``now``, ns of the steady clock; poses last, so that who has
-        them has the rest of the tick, too.
+        """Publish the simulation's state with ``stamp``, ns, on topics with subscribers. Markers
+        come at most every MARKER_PERIOD by ``now``, ns of the steady clock. Poses come last, so
+        that whoever has them has the rest of the tick, too.
 
-        ``paused``: publish measures, swings, poses and markers without a subscriber, too, for late
-        ones.
+        ``paused``: publish measures, swings, poses and markers at once and also without a
+        subscriber, for late ones.
         """
         self.publish_clock(stamp)
         self._tf.publish(simulation, stamp)
@@ -185,12 +187,16 @@ class Outputs:
     @property
     def _latched_topics(self) -> tuple[tuple[
             LatchedTopic | None, Callable[[Simulation, int], None]], ...]:
-        """What late listeners get of each tick, and what publishes it; poses last."""
+        """Topics with the last ticks for late subscribers, each with its method that publishes;
+        None for a topic that does not exist. Poses last.
+        """
         return ((self._measures, self._publish_measures), (self._swings, self._publish_swings),
                 (self._poses, self._publish_poses))
 
     def publish_on_pause(self, simulation: Simulation, stamp: int) -> None:
-        """On pause, publish the pending messages to the latched topics for late subscribers."""
+        """On pause, publish to the latched topics what they lack of the last tick, and the markers,
+        for late subscribers.
+        """
         for publish in self._pending:
             publish(simulation, stamp)
         self._pending = []

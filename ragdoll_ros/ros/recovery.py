@@ -69,7 +69,9 @@ class Recovery:
         return {'bad_states': self.count, 'bad_state': self._reason, 'state_dump': self._dump}
 
     def _report(self, bad: BadState, directory: str) -> None:
-        """Log it; write a file for the first of several in a row, as the others are alike."""
+        """Log a bad state. Write a file for the first of several in a row, as the others are alike,
+        and MAX_DUMPS at most.
+        """
         logger = self._node.get_logger()
         line = f'bad state at {bad.time / SECOND:.9g} s was not published: {bad.reason}; '
         if self._consecutive == MAX_CONSECUTIVE:

@@ -19,10 +19,10 @@ MAX_READ_TIME = 200_000
 class Stamps:
     """Stamps in ns: the ROS time at which each state was due.
 
-    They are the steady clock plus an offset as long as ROS time is, so evenly spaced ticks have
-    evenly spaced stamps. They never go back, except where ROS time restarts: at the first message
-    of a /clock, or when it jumps back by more than a second. Before the first /clock they count
-    from zero.
+    A stamp is the steady time plus an offset, so evenly spaced ticks have evenly spaced stamps. The
+    offset changes if ROS time restarts, or departs from that sum by more than MAX_DRIFT. Stamps
+    never go back, except where ROS time restarts: at the first message of a /clock, or when it
+    jumps back by more than a second. Before the first /clock they count from zero.
 
     ``now`` returns ROS time, ns, 0 while unknown; ``steady`` the clock of the ticks' due times, ns.
     """

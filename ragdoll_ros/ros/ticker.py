@@ -40,10 +40,11 @@ SERVICE_INTERVAL, QOS_EVENT_INTERVAL = 100_000_000, 1_000_000_000
 
 
 class PollThrottle:
-    """Rate limiter: opens for two wake-ups per ``interval``, ns, in which entities are polled.
+    """Rate limiter: opens for ``wakes`` wake-ups per ``interval``, ns, in which entities are
+    polled: two, or one after Ticker.drive().
 
     At each wake-up rclpy's executor goes through all waitables of a node: services and QoS events,
-    37 here, cost more per tick than a sleeping doll. Two wake-ups, because the executor collects
+    37 here, cost more per tick than a sleeping doll. Two wake-ups, because that executor collects
     the entities, waits, and then handles what it had collected; a timer that is ready comes first.
     """
 
@@ -67,7 +68,8 @@ class PollThrottle:
 class Ticker:
     """A timer on the ``steady`` clock that calls ``tick(due)`` each period, from start() to stop().
 
-    ``due`` is the steady time, ns, at which the tick was due. An executor may drive() it instead.
+    ``due`` is the steady time, ns, at which the tick was due. After drive() an executor takes the
+    timer's place.
     """
 
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
@@ -88,11 +90,13 @@ class Ticker:
 
     @property
     def dropped_ticks(self) -> int:
-        """Number of ticks that would have been made in that time."""
+        """Number of ticks that would have been made in ``dropped_time``."""
         return round(self._pacer.dropped_ticks)
 
     def polls(self, interval: int) -> bool:
-        """Whether to poll entities of this ``interval``, one of those above; true while stopped."""
+        """Whether to poll the entities of SERVICE_INTERVAL or QOS_EVENT_INTERVAL; true while
+        stopped.
+        """
         return not self.running or self._throttles[interval].is_open
 
     @property
@@ -107,7 +111,7 @@ class Ticker:
         return self._pacer.wait(time.monotonic_ns()) + later
 
     def drive(self) -> None:
-        """Leave it to the caller to call run(), which polls where it is to after each."""
+        """End the timer: the caller calls run() instead, and after it polls what polls() allows."""
         self._is_timed = False
         self._timer.cancel()
         for throttle in self._throttles.values():
@@ -122,8 +126,8 @@ class Ticker:
         self.running = True
 
     def set_idle(self, idle: bool) -> None:
-        """While idle, all dolls asleep without a subscriber, wake every second tick and make two:
-        an rclpy wake-up costs more than such a tick.
+        """While ``idle``, wake every second tick and make two, as an rclpy wake-up costs more than
+        such a tick. ``idle``: all dolls are asleep and there is no subscriber.
         """
         ticks = IDLE_TICKS if idle else 1
         if ticks != self._ticks_per_wake:

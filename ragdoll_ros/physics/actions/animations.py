@@ -1,8 +1,8 @@
 """Animations: the dolls of a scene that their animations move, until each goes limp.
 
-Within an interval such a doll moves at the constant velocities that take it to where the animation
-is at the end; there it has the animation's own. A doll with motors is not moved: the animation sets
-the targets of its motors. Times in ns.
+In an interval, a doll without motors moves at the constant velocities that take it to the pose of
+its animation at the interval's end; there it gets the animation's velocities. A doll with motors is
+not moved: the animation sets the targets of its motors. Times in ns.
 """
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class _Animated:
 
     @property
     def limp_at(self) -> int | None:
-        """ns; None: only when it is told to."""
+        """Time, ns, at which the doll goes limp; None: only when it is told to."""
         limp_at = self.placement.animation.limp_at
         return None if math.isinf(limp_at) else self.begin + round(limp_at * SECOND)
 
@@ -45,8 +45,8 @@ class _Animated:
         return self.known[1]
 
     def moving(self, time: int, end: int) -> GeneralizedState:
-        """Coordinates at ``time``, and the velocities that take it to where it is at ``end``, if
-        its animation does not begin anew before.
+        """Coordinates at ``time``, and the constant velocities that take the doll to its
+        coordinates at ``end``, if the animation goes on until then without beginning anew.
         """
         q, target = self.at(time).q, self._evaluate(time, end - time).q
         layout = self.placement.animation.motion.layout
@@ -59,7 +59,7 @@ class _Animated:
                                            (time - self.begin) / SECOND, further / SECOND)
 
     def changes(self, time: int) -> Iterator[int]:
-        """Times after ``time`` when the animation ends or begins anew, and when it goes limp."""
+        """Times after ``time`` when the animation ends or begins anew, or the doll goes limp."""
         left = self.placement.animation.left((time - self.begin) / SECOND)
         if math.isfinite(left):
             yield time + max(1, math.ceil(left * SECOND))
@@ -71,7 +71,7 @@ class Animations:
     """All animated dolls of a scene that are not limp yet; false if there is none."""
 
     def __init__(self, scene: Scene | None, time: int) -> None:
-        """Begin at ``time``; None: no animations."""
+        """Begin the animations of a scene at ``time``; ``scene`` None: no animations."""
         self._animated = {doll: _Animated(placement, doll, time) for doll, placement in enumerate(
             scene.dolls if scene else ()) if placement.animation}
 
@@ -85,7 +85,7 @@ class Animations:
 
     @property
     def kinematic(self) -> list[int]:
-        """Indices of those without motors, which move as they are told."""
+        """Indices of the dolls without motors, which move as their animations say."""
         return [doll for doll, each in self._animated.items() if each.placement.is_animated]
 
     def aim(self, springs: JointSprings, time: int, end: int) -> None:
@@ -110,7 +110,7 @@ class Animations:
         return dict(self._animated)
 
     def go_back(self, saved: object, engine: Engine) -> None:
-        """Animate the dolls again that were when this was saved; ``engine`` is another one."""
+        """Animate again the dolls that were animated at save(); tell a new ``engine`` which."""
         self._animated = dict(saved)
         self.restore(engine)
 
@@ -127,16 +127,20 @@ class Animations:
                        and force > self._animated[doll].placement.animation.limp_above})
 
     def next_change(self, time: int, end: int) -> int:
-        """Time, until ``end``, at which a motion changes or a doll goes limp."""
+        """Earliest time after ``time`` at which a motion changes or a doll goes limp, at most
+        ``end``.
+        """
         return min((at for each in self._animated.values() for at in each.changes(time)
                     if at < end), default=end)
 
     def begin_interval(self, engine: Engine, time: int, end: int) -> None:
-        """Let the dolls move so that they are at ``end`` where their animations are then."""
+        """Set coordinates and velocities of the dolls without motors so that they are at ``end``
+        where their animations are then.
+        """
         self._set(engine, lambda each: each.moving(time, end))
 
     def end_interval(self, engine: Engine, time: int) -> None:
-        """Give the dolls the poses and velocities of their animations."""
+        """Set poses and velocities of the dolls without motors to those of their animations."""
         self._set(engine, lambda each: each.at(time))
 
     def release(self, engine: Engine, dolls: Iterable[int], time: int) -> None:
@@ -161,7 +165,9 @@ class Animations:
 
 def _forces(loads: tuple[Wrenches, Springs, Drives],
             state: State) -> Iterator[tuple[int, float]]:
-    """Bone of each load, and the norm of its force, N; joint springs have none."""
+    """Bone of each load, and the norm of its force, N; of a hand's spring without the damping.
+    Joint springs have none.
+    """
     wrenches, springs, drives = loads
     for wrench in wrenches:
         yield wrench.bone, float(np.linalg.norm(wrench.force))
@@ -175,7 +181,7 @@ def _forces(loads: tuple[Wrenches, Springs, Drives],
 
 
 def _with(engine: Engine, states: dict[int, GeneralizedState]) -> GeneralizedState:
-    """The coordinates of all dolls, with these of some."""
+    """Coordinates and velocities of all dolls: the engine's, with ``states`` of some dolls."""
     here, layout = engine.coordinates, engine.layout
     for doll, state in states.items():
         here.q[layout.doll_q[doll]], here.v[layout.doll_v[doll]] = state.q, state.v

@@ -1,4 +1,4 @@
-"""Motion of a body's frame at constant twist, for TIMEOUT; and what drive_body() is told."""
+"""Motion of a body's frame at constant twist, for TIMEOUT; and the arguments of drive_body()."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -51,7 +51,7 @@ class TwistMotion:
 
     @property
     def end(self) -> int:
-        """Time, ns, from which on it stands."""
+        """Time, ns, at which the motion ends and the frame stops."""
         return self.since + TIMEOUT
 
     def twist_at(self, time: int) -> Twist:

@@ -1,8 +1,9 @@
 """DrivenBodies: the motions of bodies with `follow`, from the last pose and twist of each.
 
-A motion goes on at constant twist for TIMEOUT, then the body stands. What follows exactly reaches
-the motion at the end of the tick in which it begins, and then moves with it. What gives way is
-pulled to it by a stiff drive, whose target velocity has a part in proportion to the distance.
+A motion goes on at constant twist for TIMEOUT, then the body stands. A body that follows exactly
+reaches its motion at the end of the tick in which the motion begins, and then moves with it. A body
+that gives way is pulled to its motion by a stiff drive, whose target velocity has a part in
+proportion to the distance, at most CATCH_UP_SPEED.
 """
 from __future__ import annotations
 
@@ -46,7 +47,7 @@ LEASH = 0.02
 
 @dataclass
 class _BoneMotion(TwistMotion):
-    """Motion of a body's frame, and how its bone gets there."""
+    """Motion of a body's frame, and how the body's bone approaches this motion."""
 
     approach: Twist = AT_REST
     """Of the bone, until ``approach_end``, ns."""
@@ -74,7 +75,9 @@ class _Body:
 
     def drive(self, pose: Pose | None, twist: Twist, time: int, tick: int,
               state: State) -> Pose | None:
-        """Begin a motion at ``time``. Returns the pose of the bone where it jumps to, if so."""
+        """Begin a motion at ``time``. If the body jumps, returns the new pose of its bone, else
+        None.
+        """
         before, here = self.motion, self.frame(state)
         due = here if self.placement.is_kinematic else before.at(time)
         self.motion = _BoneMotion(
@@ -107,7 +110,7 @@ class _Body:
         return velocity, spin
 
     def moves(self, time: int) -> bool:
-        """Whether it is on its way."""
+        """Whether the body moves; one that gives way counts as moving until its motion ends."""
         motion = self.motion
         if not self.placement.is_kinematic:
             return motion.told and time < motion.end
@@ -135,7 +138,7 @@ class _Body:
             self.shape_pose.relative(Pose()))
 
     def _distance(self, a: Pose, b: Pose) -> float:
-        """Bound, m, on the distance of a point of the body at two poses."""
+        """Distance, m, of the frame's origins at two poses, plus the angle times ``reach``."""
         turn = float(rotation.angle_between(a.orientation, b.orientation))
         return float(np.linalg.norm(a.position - b.position)) + turn * self.reach
 
@@ -156,7 +159,7 @@ class DrivenBodies:
         self._limited = [body for body in bodies.values() if not body.placement.is_kinematic]
 
     def change_scene(self, change: SceneChange, state: State) -> None:
-        """Let the bodies that stay go on as they move, and those that come stand."""
+        """Let the bodies that stay continue their motions; new ones stand."""
         bodies = DrivenBodies(change.after, state)._bodies
         for name, body in self._bodies.items():
             if name in bodies:
@@ -211,15 +214,15 @@ class DrivenBodies:
                 body.hold(state, time)
 
     def forget_twists(self) -> None:
-        """The engine's twists are not those that were set: another state was restored."""
+        """Forget which twists were set, so that all are set again: another state was restored."""
         for body in self._exact:
             body.engine_twist = None
         for robot in self._robots.values():
             robot.forget_twists()
 
     def twists(self, time: int, end: int, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Dolls (n,) that follow exactly and change their twists, and these (n, 6) until ``end``:
-        m/s and rad/s.
+        """Dolls (n,) that follow exactly and whose twists change, and their new twists (n, 6),
+        constant until ``end``: m/s and rad/s. Takes them for set.
         """
         dolls: list[int] = []
         twists: list[np.ndarray] = []
@@ -248,7 +251,7 @@ class DrivenBodies:
                   for bone in robot.bones)]
 
     def next_change(self, time: int, end: int) -> int:
-        """Time, until ``end``, at which a motion changes."""
+        """Earliest time after ``time`` at which a motion changes, at most ``end``."""
         for body in self._bodies.values():
             for at in (body.motion.approach_end, body.motion.end):
                 if time < at < end:
@@ -265,5 +268,7 @@ def _driven_robot(scene: Scene, robot: Robot) -> DrivenRobot:
 
 
 def _catch_up(missing: np.ndarray) -> np.ndarray:
-    """Velocity (3,) towards what is ``missing``, m or rad."""
+    """Velocity (3,), m/s or rad/s, that makes up for what is ``missing``, m or rad: at most
+    CATCH_UP_SPEED.
+    """
     return np.array(clamp_norm((missing / CATCH_UP_TIME).tolist(), CATCH_UP_SPEED)[0])

@@ -1,8 +1,8 @@
-"""DrivenRobot: a robot of several links, moved by forward kinematics from what it was told last.
+"""DrivenRobot: a robot of several links, moved by forward kinematics as commanded last.
 
-Its frame moves on at its twist and each joint at its rate for TIMEOUT after it was told, then
-stands. A value that is told is reached at the end of the tick in which it is: a joint turns there
-at a constant rate, so that links move along their arcs.
+Its frame moves at its twist and each joint at its rate for TIMEOUT after the command, then stands.
+At the end of the tick in which a command begins, a joint is where its value and rate take it. Until
+then it moves at a constant rate, so that links move along their arcs.
 """
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NO_TWISTS = np.zeros(0, np.int64), np.zeros((0, 6))
 
 @dataclass
 class _FrameMotion(TwistMotion):
-    """Motion of a robot's frame, which first gets from ``begin`` to it."""
+    """Motion of a robot's frame; until ``approach_end`` the frame gets from ``begin`` to it."""
 
     begin: Pose | None = None
     approach_end: int = -1
@@ -98,7 +98,9 @@ class DrivenRobot:
         return self._frame.at(time)
 
     def is_stale(self, time: int) -> bool:
-        """Whether nothing has moved it yet, or one of what was told to move stands again."""
+        """Whether no command has moved the robot yet, or the motion of its frame or of a joint that
+        a command has moved is over.
+        """
         motions = self._links.motions
         ends = motions['end'][motions['told'] > 0].tolist()
         if self._frame.told:
@@ -106,7 +108,7 @@ class DrivenRobot:
         return not ends or time >= min(ends)
 
     def moves(self, time: int) -> bool:
-        """Whether it is on its way."""
+        """Whether the frame or a joint still moves."""
         return time < self._arrival
 
     def drive(self, command: MotionCommand, time: int, tick: int,
@@ -136,11 +138,13 @@ class DrivenRobot:
         return list(zip(self.dolls.tolist(), map(Pose, poses[:, :3], poses[:, 3:]), strict=True))
 
     def forget_twists(self) -> None:
-        """The engine has other twists of the links than were set last."""
+        """Forget which twists were set, so that all are set again: the engine has others."""
         self._links.twists[:], self._stands = math.inf, False
 
     def changed_twists(self, time: int, end: int, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Dolls (m,) of links whose twists change, and these (m, 6) until ``end``: m/s, rad/s."""
+        """Dolls (m,) of links whose twists change, and their new twists (m, 6), constant until
+        ``end``: m/s, rad/s. Takes them for set.
+        """
         links = self._links
         if self.moves(time):
             self._stands = False
@@ -156,7 +160,7 @@ class DrivenRobot:
         return self.dolls[links.changed], links.twists[links.changed]
 
     def next_change(self, time: int, end: int) -> int:
-        """Time, until ``end``, at which a motion changes."""
+        """Earliest time after ``time`` at which a motion changes, at most ``end``."""
         end = min((at for at in (self._frame.approach_end, self._frame.end) if at > time),
                   default=end)
         return kernels.next_joint_change(self._address, time, end)

@@ -62,7 +62,7 @@ class _Spring:
         return self.since + round(self.full.left * SECOND) if self.moves else self.since
 
     def target(self, time: int) -> float:
-        """Rad."""
+        """Target at ``time``, rad."""
         seconds = (min(time, self.end) - self.since) / SECOND
         return self.full.target + self.full.rate * seconds
 
@@ -103,7 +103,7 @@ class JointSprings:
         return bool(self._active)
 
     def joint_springs(self, time: int) -> tuple[JointSpring, ...]:
-        """Springs by name, oldest first."""
+        """All joint springs, each with its target at ``time``."""
         return tuple(JointSpring(name, each.target(time), each.full.stiffness, each.full.damping,
                                  each.full.most, each.strength)
                      for name, each in self._all.items())
@@ -118,7 +118,7 @@ class JointSprings:
         return self._standing
 
     def next_change(self, time: int, end: int) -> int:
-        """Time, until ``end``, at which a target stands."""
+        """Earliest time after ``time`` at which a target stops moving, at most ``end``."""
         return min((each.end for each in self._active if each.moves and time < each.end < end),
                    default=end)
 
@@ -158,7 +158,9 @@ class JointSprings:
         self._forget()
 
     def follow(self, doll: int, angles: np.ndarray, rates: np.ndarray, time: int) -> None:
-        """Let a doll's targets be at ``angles`` (k,) rad, and move on at ``rates`` (k,)."""
+        """Set the targets of a doll's springs to ``angles`` (k,) rad; they move on at ``rates``
+        (k,), rad/s, for TIMEOUT.
+        """
         names = self._scene.angle_names_of(self._scene.dolls[doll])
         for name, angle, rate in zip(names, angles.tolist(), rates.tolist(), strict=True):
             if name in self._all:
@@ -176,7 +178,9 @@ class JointSprings:
         self._forget()
 
     def changed(self, change: SceneChange) -> JointSprings:
-        """Those on dolls that stay, in the scene after, with those of dolls that come."""
+        """Joint springs after a scene change: of dolls that stay, and of the motors of
+        new dolls.
+        """
         after = JointSprings(change.after)
         for placement, old in zip(change.after.dolls, change.old_dolls, strict=True):
             for name in change.after.angle_names_of(placement) if old >= 0 else ():
@@ -199,7 +203,7 @@ class JointSprings:
         self._forget()
 
     def _forget(self) -> None:
-        """Springs have changed."""
+        """Update which springs act, and discard the kept result of springs()."""
         self._active = [each for each in self._all.values() if each.strength > 0]
         self._standing: tuple[AppliedJointSpring, ...] | None = None
         """What springs() returns while no target moves."""

@@ -41,7 +41,7 @@ def bones_of(scene: Scene, dolls: Sequence[int]) -> np.ndarray:
 
 
 def _joint(robot: Robot, joint: RobotJoint, parent: int) -> tuple:
-    """A LINK_JOINT."""
+    """Fields of the LINK_JOINT of a joint; ``parent``: index of its parent's frame."""
     leader, multiplier, offset = joint.mimic or (joint.name, 1.0, 0.0)
     if joint.kind == 'fixed':
         leader, offset = '', 0.0

@@ -1,4 +1,4 @@
-"""What some engines can and others cannot; an engine states its own as ``capabilities``."""
+"""Optional features of engines; an engine lists those that it has as ``capabilities``."""
 from __future__ import annotations
 
 from collections.abc import Collection
@@ -8,7 +8,9 @@ from ...model import errors
 
 
 class Capability(Enum):
-    """A capability; its value says in a message what an engine does that has it."""
+    """Optional feature of an engine. Its value follows 'rigid, which' in the message of
+    require().
+    """
 
     JOINT_SPRINGS = 'has joint springs'
     PASSIVE_TORQUES = 'has passive joint torques'
@@ -23,6 +25,6 @@ class Capability(Enum):
 
 
 def require(capability: Capability, among: Collection[Capability], name: str) -> None:
-    """Raise WrongForm if a capability is not among those of the engine of this name."""
+    """Raise WrongForm if ``capability`` is not ``among`` those of the engine ``name``."""
     if capability not in among:
         raise errors.WrongForm('engine', name, f'rigid, which {capability.value}')

@@ -34,7 +34,8 @@ class MissingEngine(errors.RagdollError):
 class Contacts:
     """All c contact points, each between bone ``a`` and bone ``b``, a static body or the ground.
 
-    Forces are the impulse of the last substep over its duration.
+    Forces are the impulse of the last step or substep over its duration; with mujoco they are those
+    at the current state.
     """
 
     a: np.ndarray
@@ -68,12 +69,12 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Overlap:
-    """A bone that begins in something else.
+    """An overlap of a bone with another bone, a static body or the ground at given coordinates.
 
     Args:
         bone: its name in the scene.
         other: name of another bone or of a static body, or 'ground'.
-        depth: m, the shortest way for one of the two out of the other.
+        depth: penetration, m: the shortest way for one of the two out of the other.
     """
 
     bone: str
@@ -116,7 +117,8 @@ class Impacts:
 
 @dataclass(frozen=True)
 class AppliedWrench:
-    """A force (3,) N and a torque (3,) N m on a bone, constant over one step.
+    """A force (3,) N and a torque (3,) N m on a bone, constant as long as it is applied: during one
+    advance(), or one of its intervals.
 
     ``point`` (3,) m is where the force acts, in the bone's frame, from its centre of mass. Force
     and torque are in the bone's frame if ``local``, else in the world frame.
@@ -255,16 +257,18 @@ class Engine(Protocol):
     def set_coordinates(self, coordinates: GeneralizedState) -> None:
         """Set the state, wake all dolls and restart the energy account.
 
-        Collision is disabled between bones of one doll that overlap by more than
-        allowed_penetration(), for good or until they separate. A doll that is deeper than that in
-        the ground is lifted onto it.
+        Two bones of one doll do not collide, with bullet and mujoco for good, if they overlap by
+        more than allowed_penetration(); with rigid until they separate, if they overlap by more
+        than 1 mm here and in the scene's placements, and while a joint between them is outside its
+        limits. A doll that is deeper in the ground than allowed_penetration() is lifted onto it.
         """
 
     def set_doll(self, doll: int, coordinates: GeneralizedState) -> None:
-        """Set the coordinates and velocities of one doll to its own in ``coordinates``, and wake
-        all of its old cluster. The change of energy counts as work of pushes. If it is deeper in
-        the ground than allowed_penetration(), it is lifted onto it. Collision is disabled between
-        its bones that overlap at new joint angles, as by set_coordinates().
+        """Set the coordinates and velocities of one doll to those in ``coordinates``, and wake all
+        dolls of its old cluster. The change of energy counts as work of pushes. If it is deeper in
+        the ground than allowed_penetration(), it is lifted onto it. If its joint angles change,
+        collision is disabled between its bones as by set_coordinates(); with rigid wherever they
+        now overlap by more than 1 mm.
         """
 
     def set_twists(self, dolls: np.ndarray, twists: np.ndarray) -> None:
@@ -274,16 +278,17 @@ class Engine(Protocol):
         """
 
     def set_kinematic(self, doll: int, kinematic: bool) -> None:
-        """Let a doll move at its velocities, whatever acts on it, or no more. What is kinematic has
-        no contact with itself and the ground, and its energy counts as zero. Of an animated doll;
-        its bones that overlap when it ends do not collide until they separate. An engine that has
-        no kinematic dolls does nothing: set_motion() is all that moves one.
+        """Make an animated doll kinematic, so that it moves at its velocities whatever acts on it,
+        or end that. A kinematic doll has no contacts with itself, static bodies and the ground, and
+        its energy counts as zero. Its bones that overlap when that ends do not collide until they
+        separate. An engine without kinematic dolls leaves all motion to set_motion(), and disables
+        collision of overlapping bones for good when that ends.
         """
 
     def set_motion(self, dolls: Sequence[int], coordinates: GeneralizedState) -> None:
-        """Set the coordinates and velocities of kinematic ``dolls`` to their own in
-        ``coordinates``, wherever they are then; their contacts are kept. The change of energy
-        counts as work of pushes.
+        """Set the coordinates and velocities of kinematic ``dolls`` to those in ``coordinates``,
+        and wake their clusters. They are not lifted out of the ground, and their contacts are kept.
+        The change of energy counts as work of pushes.
         """
 
     def with_dolls(self, scene: Scene) -> Engine:
@@ -292,35 +297,39 @@ class Engine(Protocol):
         """
 
     def continue_from(self, engine: Engine, change: SceneChange) -> None:
-        """Take the states of the dolls that stay, to the bit, from the ``engine`` of the scene
-        before; its clusters that lose a doll wake. A doll that comes adds its energy to the
-        account, one that goes takes its energy; excess and work stay. SCENE_CHANGES.
+        """Take the states of the dolls that stay, to the bit, from ``engine``, that of the scene
+        before the change; clusters of ``engine`` that lose a doll wake. A doll that comes adds its
+        energy to the account, one that goes takes its energy from it; total excess and work stay
+        the same. SCENE_CHANGES.
         """
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
-        """Integrate over ``duration`` s, under loads that act during all of it. JOINT_SPRINGS: also
-        AppliedJointSpring.
+        """Integrate over ``duration`` s, under loads that act during all of it; dolls on which they
+        act wake. ``springs`` may include AppliedJointSpring with JOINT_SPRINGS.
         """
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
         """Set the velocities of dolls (d,), whole clusters, to zero; their energy is removed."""
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
-        """Set the generalized velocities of dolls (d,), whole clusters, to theirs in ``velocities``
-        (nv,). The change of energy counts as work of pushes. COPIES, for StabilityTest.
+        """Set the generalized velocities of dolls (d,), whole clusters, to those in ``velocities``
+        (nv,), except for kinematic dolls and fixed roots. The change of energy counts as work of
+        pushes. COPIES, for StabilityTest.
         """
 
     def simulate_copy(self, dolls: np.ndarray, velocities: np.ndarray,
                       interval: float) -> Generator[np.ndarray, None, None]:
-        """Kinetic energies (d,) J of a copy of ``dolls`` (d,), whole clusters, without loads and by
-        themselves: as it starts with ``velocities`` (nv,), and after each ``interval``, s, in
-        coarse steps. The first interval is shorter, in finer ones. The dolls stay as they are, to
-        the bit, once the generator is closed. COPIES.
+        """Simulate a copy of ``dolls`` (d,), whole clusters, without loads and without other dolls,
+        from ``velocities`` (nv,). Yield its kinetic energies (d,) J at the start and after each
+        ``interval``, s, in coarse steps; the first interval is shorter, in finer steps. Closing the
+        generator restores the state of the dolls to the bit. COPIES.
         """
 
     def dolls_on_ground(self) -> np.ndarray:
-        """Which dolls (d,) rest on the ground."""
+        """Which dolls (d,) the ground, a static body or a fixed root bears, and kinematic ones; all
+        or none with bullet and mujoco.
+        """
 
     def contacts(self) -> Contacts:
         """All contact points."""
@@ -330,8 +339,8 @@ class Engine(Protocol):
         """Impulse (n, 3) N s of contacts on each bone since the start. CONTACT_IMPULSES."""
 
     def overlaps(self, coordinates: GeneralizedState) -> tuple[Overlap, ...]:
-        """What would overlap at ``coordinates`` by more than a contact, the deepest first; the
-        state remains to the bit. OVERLAPS.
+        """Overlaps of bones with bones, static bodies or the ground at ``coordinates`` that are
+        deeper than a contact, the deepest first; the state stays the same to the bit. OVERLAPS.
         """
 
     def log_impacts(self, enabled: bool) -> None:
@@ -352,13 +361,19 @@ class Engine(Protocol):
 
     @property
     def work(self) -> tuple[float, float]:
-        """Work of pushes and of hands since the start, J."""
+        """Work since the start, J: of pushes, drives and kinematic bodies; and of hands and joint
+        springs.
+        """
 
     def measures(self) -> dict[str, float]:
-        """Error measures and counters since the start; keys end in units."""
+        """Error measures and counters, of the last advance() or since the start; keys end
+        in units.
+        """
 
     def ledger(self) -> dict[str, int]:
-        """What the steps since the start are made of; empty where steps are a library's own."""
+        """Counters of what the steps since the start are made of, see LEDGER; empty where a library
+        takes the steps.
+        """
 
     def save(self) -> object:
         """Take a snapshot that restore() reproduces to the bit, energy account included."""
@@ -370,16 +385,20 @@ class Engine(Protocol):
         """Release the memory of a snapshot."""
 
     def checkpoint(self) -> object:
-        """Save coordinates and energy account only: far cheaper than save()."""
+        """Save coordinates, energy account and what else can not be recomputed: far cheaper than
+        save().
+        """
 
     def restore_checkpoint(self, checkpoint: object) -> None:
         """Restore a checkpoint, also of another engine of the scene; contacts are recomputed."""
 
     def close(self) -> None:
-        """Release all resources; further calls do nothing."""
+        """Release all resources; closing again does nothing."""
 
 
 def allowed_penetration(scene: Scene) -> float:
-    """Initial penetration, m, that counts as a contact, between bones and with the ground."""
+    """Largest initial penetration, m, that counts as a contact with the ground, and with bullet and
+    mujoco between bones.
+    """
     return ALLOWED_PENETRATION * min(min(part.shape.half_extents)
                          for bone in scene.bones for part in bone.shape.parts)

@@ -21,7 +21,8 @@ class EngineChoice:
 def resolve_engine(engine: str | type[Engine]) -> EngineChoice:
     """Look up an engine by name, or wrap a class.
 
-    Raises OutOfRange for an unknown name, MissingEngine if its library is missing or broken.
+    Raises OutOfRange for an unknown name, MissingEngine if its library is missing or broken; for
+    mujoco MissingEngine is raised only when the engine is made.
     """
     if not isinstance(engine, str):
         return EngineChoice(engine.__name__, engine)

@@ -63,7 +63,9 @@ class ClampingMonitor:
         """Of each pair that touches, times, ns, and forces, N, since it does, at most LASTING."""
 
     def add(self, contacts: Contacts, time: int) -> None:
-        """Add the contacts at the end of a tick, at ``time``, ns; one without them ends a pair."""
+        """Add the contacts at the end of a tick, at ``time``, ns. Pairs without a contact
+        then end.
+        """
         now = _forces(contacts)
         self._forces = {pair: self._forces.get(pair, deque()) for pair in now}
         for pair, force in now.items():
@@ -81,7 +83,7 @@ class ClampingMonitor:
             self._forces.items()) if samples[-1][0] - samples[0][0] >= LASTING)
 
     def _clamping(self, pair: Pair, samples: deque[tuple[int, float]]) -> Clamping:
-        """The force of a pair on its first bone, each sample that of the time since the last."""
+        """Clamping of a pair's first bone; each sample counts for the time since the last one."""
         scene, (bone, other, body) = self._scene, pair
         times, forces = np.array(samples).T
         region = self._limits.regions.get(self._regions[bone])

@@ -48,8 +48,9 @@ class PulseLaw:
                     self._stiffness[name] = limits.regions[limits.region_of(at)].stiffness
 
     def duration(self, impact: Impact) -> float:
-        """Of an impact, s; 0 if neither a region nor a stiffness takes part. Friction and other
-        impacts beside it may take its impulse out of mu v to 2 mu v.
+        """Duration of an impact, s; 0 if neither a region nor a stiffness takes part. Friction and
+        simultaneous impacts may take its impulse out of the range mu v to 2 mu v; then the nearer
+        end counts.
         """
         springs = [self._stiffness[name] for name in (impact.bone, impact.against)
                    if name in self._stiffness]
@@ -83,8 +84,9 @@ class PulseLog:
                            min(impact.impulse, 2 * impact.effective_mass * impact.speed))
 
     def enter(self, sample: int, duration: float, impulse: float, delay: float = 0.0) -> None:
-        """Enter what came with this ``impulse``, N s, in a sample. Several in one sample share a
-        pulse: its delay and duration, s, are the means of theirs, each by its impulse.
+        """Enter a pulse that gives this ``impulse``, N s, begins ``delay`` s after a sample begins,
+        and lasts ``duration`` s. Several pulses in one sample are merged: delay and duration are
+        their means, weighted by the impulses.
         """
         if sample < len(self.pulses):
             self._impulses[sample] += impulse
@@ -92,13 +94,17 @@ class PulseLog:
                 impulse / self._impulses[sample])
 
     def between(self, first: int, last: int) -> np.ndarray:
-        """The pulse (2,) that samples ``first`` to ``last`` - 1 have together, likewise."""
+        """Delay and duration (2,), s, of the pulse that samples ``first`` to ``last`` - 1 make
+        together: means weighted by the impulses.
+        """
         impulses = self._impulses[first:last, None]
         return (impulses * self.pulses[first:last]).sum(axis=0) / max(impulses.sum(), TINY)
 
 
 def course(count: int, step: float, delay: float, duration: float) -> np.ndarray:
-    """Shares (count,) of a half-sine that come in successive samples of ``step`` s."""
+    """Shares (count,) of a half-sine pulse in successive samples of ``step`` s; it begins ``delay``
+    s after the first sample begins and lasts ``duration`` s.
+    """
     phases = (np.arange(count + 1) * step - delay) * (np.pi / max(duration, TINY))
     return np.diff((1 - np.cos(np.clip(phases, 0.0, np.pi))) / 2)
 
@@ -106,8 +112,8 @@ def course(count: int, step: float, delay: float, duration: float) -> np.ndarray
 def spread(velocities: np.ndarray, step: float, gravity: np.ndarray,
            pulses: np.ndarray) -> np.ndarray:
     """Velocities (t + 1, 3) m/s of a sensor, world frame, from those of its point on the bone,
-    ``step`` s apart, and the delay and duration of the pulse of each sample (t, 2), s. What a
-    sample with a pulse changes beyond gravity is given as a half-sine.
+    ``step`` s apart. ``pulses`` (t, 2): delay and duration of the pulse of each sample, s. The
+    change of velocity in a sample with a pulse, except by gravity, is spread over the half-sine.
     """
     changes = np.diff(velocities, axis=0) - gravity * step
     given = changes.copy()

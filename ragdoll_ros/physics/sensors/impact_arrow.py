@@ -1,5 +1,5 @@
-"""An arrow for each impact, to be drawn: along the impulse on the bone, its name, the force and
-its ratio to the limit.
+"""An arrow for each impact, to be drawn along the impulse on the bone, with a text: the bone's
+name, the force and its ratio to the limit.
 """
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ImpactArrow:
 
     @property
     def ratio(self) -> float:
-        """Peak force over its limit, to the two digits of the text; 0 without a limit."""
+        """Peak force over its limit, to the two decimals of the text; 0 without a limit."""
         found = OF_LIMIT.search(self.text)
         return float(found[1]) if found else 0.0
 

@@ -78,9 +78,9 @@ class Impact:
 
     @property
     def lost_energy(self) -> float:
-        """What the impulse takes of it, J: J v - J^2 / (2 mu); of an impact that is alone and has
-        no friction (1 - e^2) mu v^2 / 2 with a restitution e. Negative where other impacts at the
-        same time do work on it.
+        """Energy, J, that the impulse p takes from approach_energy: p v - p^2 / (2 mu). Of a single
+        impact without friction this is (1 - e^2) mu v^2 / 2 with a restitution e. Negative where
+        other impacts at the same time do work on it.
         """
         return self.impulse * self.speed - self.impulse ** 2 / (2 * self.effective_mass)
 
@@ -95,8 +95,8 @@ class Impact:
 
 
 def bones_that_hit(scene: Scene, impacts: Iterable[Impact], what: Container[str]) -> np.ndarray:
-    """Which bones (n,) have an impact against one of ``what``: 'ground', or names of bodies. What
-    bounces within a tick touches nothing at its ends.
+    """Which bones (n,) have an impact against one of ``what``: 'ground', or names of bodies. Finds
+    also bounces within a tick, which leave no contact at its ends.
     """
     found = np.zeros(len(scene.bones), bool)
     found[[scene.bone_index(each.bone) for each in impacts if each.against in what]] = True

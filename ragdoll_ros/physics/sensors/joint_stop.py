@@ -1,10 +1,10 @@
-"""Joint stops: how long a joint takes that reaches the end of its range, if tissue stops it.
+"""Joint stops: how long tissue takes to stop a joint that reaches the end of its range.
 
 A rigid joint stops at its limit in an instant. A joint of a person is stopped by a torque that
-grows e-fold per width w, rad (model/passive.py): a joint that comes with the rate r has the
+grows e-fold per width w, rad (model/passive.py): a joint that arrives with the rate r has the
 deceleration r^2 / 2 w sech^2(r t / 2 w) until it turns, whatever its inertia and the size of the
-torque. A half-sine of the same peak that stops it lasts pi w / r. Where other pulses still bring
-the joint its rate, it comes later: see soft_joints.py.
+torque. A half-sine of the same peak that stops it lasts pi w / r. Where other pulses still change
+the joint's rate, the stop begins later: see soft_joints.py.
 """
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ become faster on the way.
 
 
 class Stop(NamedTuple):
-    """Duration, s, of the stop of a joint angle that has met its limit, the impulse, N s, of what
-    hangs on it, at the distance of its radius of gyration, and how much later it begins, s.
+    """Stop of a joint angle at its limit: its duration, s; the impulse, N s, of what hangs on the
+    joint, at the distance of the radius of gyration; and by how much later the stop begins, s.
     """
 
     duration: float
@@ -76,8 +76,8 @@ class JointStops:
 
 
 def _first_moment(doll: Ragdoll, joint: Joint) -> float:
-    """Mass of what hangs on a joint, as built, times its radius of gyration about axes through the
-    joint, kg m.
+    """Mass of what hangs on a joint times its radius of gyration about the joint, kg m, in the bind
+    pose: the root mean square over all axes.
     """
     hanging, total, mass = {joint.child}, 0.0, 0.0
     for other in doll.joints_depth_first():

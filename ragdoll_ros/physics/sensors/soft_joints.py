@@ -1,10 +1,10 @@
-"""Soft joints: where joints would be if impacts and stops took time, beside the rigid motion.
+"""Soft joints: where joints would be if impacts and stops took time, beside the rigid ones.
 
-In the rigid motion a blow gives a joint its rate at once, and the joint may reach its end within
-the tick. If the blow takes time, the joint comes later and slower, while the rate is still coming.
-So a stop begins when the soft joint has caught up with the rigid one. With the share a of the rate
-that it has by then, and the time R in which the pulses bring the rest, the stop lasts
-a (pi w / a r) + (1 - a) R: what is there is stopped by tissue, the rest as it comes.
+In the rigid motion an impact changes a joint's rate at once, and the joint may reach its end within
+the tick. If the impact takes time, the joint comes later and slower, while its rate still changes.
+So a stop begins when the soft joint has caught up with the rigid one. The joint then has the share
+a of the rate r, and the pulses bring the rest in the time R. The stop lasts a (pi w / a r) + (1 -
+a) R: tissue stops the rate that is there, and the rest as it comes.
 """
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .contact_pulse import course
 
 
 class SoftJoints:
-    """How late k joint angles are beside the rigid ones, tick by tick, in a motion of ``count``
-    states that are ``step`` s apart. A pulse that is over leaves nothing behind.
+    """Lags of k joint angles and rates behind the rigid ones, tick by tick, in a motion of
+    ``count`` states that are ``step`` s apart. A pulse that is over leaves no lag.
     """
 
     def __init__(self, count: int, joints: int, step: float) -> None:
@@ -28,8 +28,8 @@ class SoftJoints:
         """rad by which angles are behind, likewise."""
 
     def arrival(self, joint: int, sign: int, rate: float) -> tuple[float, float]:
-        """How much later a joint comes to where the rigid one is, with the ``rate``, rad/s, towards
-        its end in the direction ``sign``; and how much longer its stop takes, s.
+        """Delay, s, until a joint is where the rigid one is, with the ``rate``, rad/s, towards its
+        end in the direction ``sign``; and by how much its stop is longer, s.
         """
         late = sign * self._late[self._at:, joint]
         turns = (rate - late) * self._step
@@ -40,8 +40,8 @@ class SoftJoints:
         return after * self._step, missing * self._step * (rest[-1] + 1 if len(rest) else 0)
 
     def advance(self, changes: np.ndarray, delay: float, duration: float) -> None:
-        """A tick in which rates change by ``changes`` (k,) rad/s, over a pulse that begins
-        ``delay`` s after the beginning of the tick.
+        """Add a tick in which rates change by ``changes`` (k,) rad/s, over a pulse that begins
+        ``delay`` s after the beginning of the tick and lasts ``duration`` s.
         """
         self._at += 1
         count = min(math.ceil((delay + duration) / self._step) - 1, len(self._late) - self._at)

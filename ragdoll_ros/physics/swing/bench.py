@@ -1,4 +1,4 @@
-"""Benchmark of swings without dolls: CPU time of a tick."""
+"""Benchmark of swings without dolls: wall time of a tick."""
 import statistics
 import time
 

@@ -51,11 +51,11 @@ def make_colliders(mounted: Sequence[SwingMount]) -> tuple[np.ndarray, np.ndarra
 def carried(lengths: np.ndarray, masses: np.ndarray, springs: np.ndarray,
             weight: float) -> tuple[np.ndarray, np.ndarray]:
     """Inertia J (n,) kg m^2 and first moment (n,) kg m about the root of each link of a chain, with
-    all that it carries; ``weight``: of a kg, N.
+    all that it carries; ``weight``: of 1 kg, N.
 
     The first moment is that of the straight chain. With J, the link swings at the lowest frequency
-    of the true chain of it and all links beyond, which hangs from a root at rest. Without springs
-    or weight that is the straight chain's moment of inertia.
+    of the true chain that it forms with all links beyond, hanging from a root at rest. Where that
+    frequency is zero, J is the straight chain's moment of inertia.
     """
     inertia, lever = np.zeros((2, len(lengths)))
     for index in range(len(lengths)):

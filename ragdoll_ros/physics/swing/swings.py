@@ -1,8 +1,8 @@
-"""Swings: integration of all swings of a scene, with results that do not depend on the frame rate.
+"""Swings: integration of all swings of a scene, with results independent of the frame rate.
 
 Integration uses a fixed time grid that begins at the start. The state between two grid points is
-one shorter step from the last of them, which is then discarded. So a state depends on the start,
-the time and the bones' motion only, not on which other times were evaluated.
+computed by one shorter step from the earlier one; this step is then discarded. So a state depends
+on the start, the time and the bones' motion only, not on which other times were evaluated.
 
 Chains are integrated from root to tip: each link hangs from the mass before it, whose motion drives
 it, and carries the masses beyond it as an inertia with which its own frequency is that of the true
@@ -111,8 +111,8 @@ class Swings:
         self._last = self._state(self._states, time)
 
     def resume(self, time: float, other: Swings, masses: np.ndarray) -> None:
-        """Start at ``time`` s, at rest but for masses of ``other``, which go on as they are there:
-        ``masses`` (m,) is the index here of each, -1 for none.
+        """Start at ``time`` s, at rest except for masses of ``other``, which go on as they are
+        there. ``masses`` (m,): index here of each mass of ``other``; -1: it is gone.
         """
         self.begin(time)
         stay = masses >= 0
@@ -173,7 +173,9 @@ class _FreeFall:
         self._velocity = np.array([mount.swing.velocity for mount, _ in links]).reshape(-1, 3)
 
     def begin(self, time: float, bones: State) -> None:
-        """Release the masses at ``time`` s from the ends of their rods at rest."""
+        """Release the masses at ``time`` s, with their swings' velocities, from where the ends of
+        their rods are at rest.
+        """
         self._begin = time
         self._turn = bones.orientations[self._bone]
         arm = rotation.rotate(self._turn, self._root)
@@ -231,8 +233,8 @@ class SwingSimulation:
 
     def changed(self, after: SwingSimulation, change: SceneChange, time: int,
                 state: State) -> SwingSimulation:
-        """The swings of the scene after a change at ``time`` ns, of which ``after`` is new. Those
-        that stay go on; if all do and none comes, to the bit.
+        """Return the swings of the scene after a change at ``time`` ns; ``after``: new ones of that
+        scene. Masses that stay go on; if all stay and none comes, these swings go on to the bit.
         """
         masses = _new_masses(change)
         if np.array_equal(masses, np.arange(len(after.names))):

@@ -44,8 +44,8 @@ class Body:
 
 
 class Person(NamedTuple):
-    """What all bodies of equal dolls share: names of the angles and, if it is a person, the frame
-    and the URDF with ANY_ID for the id.
+    """What bodies of equal dolls share: the names of the angles and, if the doll is a person, the
+    frame and the URDF with ANY_ID for the id. Else ``frame`` is None.
     """
 
     angle_names: tuple[str, ...]
@@ -54,7 +54,7 @@ class Person(NamedTuple):
 
     @classmethod
     def of(cls, doll: Ragdoll) -> Person:
-        """That of a doll."""
+        """Return what the bodies of a doll share."""
         names = tuple(name for joint in doll.joints for name in joint.angle_names)
         if set(names) >= JOINTS:
             return cls(names, doll.root.pose.relative(_mid_hips(doll)), body_urdf(doll))
@@ -62,8 +62,8 @@ class Person(NamedTuple):
 
 
 def bodies(scene: Scene, most: int, persons: PerDoll[Person] | None = None) -> list[Body]:
-    """The first persons of a scene, at most so many. ``persons``: of Person.of, kept from scene to
-    scene.
+    """Return the first persons of a scene, ``most`` at most. ``persons``: what Person.of has made
+    for dolls, kept from scene to scene.
     """
     found, ids, first = [], set(), 0
     persons = persons or PerDoll(Person.of)
@@ -82,7 +82,9 @@ def bodies(scene: Scene, most: int, persons: PerDoll[Person] | None = None) -> l
 
 
 def _id(name: str, taken: set[str]) -> str:
-    """The doll's name as part of a topic's name: letters, digits and underscores."""
+    """Make the doll's name part of a topic's name: letters, digits and underscores, a letter first.
+    A number is added if the name is in ``taken``.
+    """
     plain = re.sub('[^A-Za-z0-9_]', '_', name)
     plain = plain if plain[:1].isalpha() else f'b{plain}'
     numbered = (f'{plain}_{count}' for count in itertools.count(2))
@@ -90,13 +92,17 @@ def _id(name: str, taken: set[str]) -> str:
 
 
 def _mid_hips(doll: Ragdoll) -> Pose:
-    """The middle of the hips with the doll's axes, in its frame, bind pose."""
+    """Return a frame in the middle between the hip joints with the axes of the doll: its pose in
+    the doll's frame, bind pose.
+    """
     return Pose(np.mean([joint.anchor for joint in doll.joints
                          if {'l_p_hip', 'r_p_hip'} & set(joint.angle_names)], axis=0))
 
 
 def body_urdf(doll: Ragdoll) -> str:
-    """The doll's URDF below a link body_<id>, all names with the suffix _<id>; ANY_ID for <id>."""
+    """Return the doll's URDF with a root link body_<id> above it. All names have the suffix _<id>;
+    ANY_ID stands for <id>.
+    """
     ending, hips = f'_{ANY_ID}', _mid_hips(doll)
     renamed = doll.renamed(lambda name: name + ending)
     joints = tuple(

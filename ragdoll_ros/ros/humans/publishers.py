@@ -53,13 +53,17 @@ class Humans:
         """For /diagnostics: the ids, or why nothing is published; empty without persons."""
 
     def prepare(self, scene: Scene) -> list[Body]:
-        """The persons of a scene; this may run beside the ticks."""
+        """Return the persons of a scene, MAX_BODIES at most, without hri_msgs only the first. This
+        may run beside the ticks.
+        """
         self._persons.keep(placement.doll for placement in scene.dolls)
         # One is enough to say that it is not published.
         return bodies(scene, 1 if IdsList is None else MAX_BODIES, self._persons)
 
     def set_scene(self, found: list[Body], frame: str, publish_tf: str) -> None:
-        """Publish the URDFs of a scene's persons; ``frame`` names the world frame."""
+        """Publish the ids of the persons ``found``, and the URDFs of those that are new; destroy
+        the publishers of others. ``frame`` names the world frame.
+        """
         self._frame, self.status = frame, ', '.join(body.id for body in found)
         if found and IdsList is None:
             self.status = f'not published, as hri_msgs is not installed: {MISSING}'
@@ -118,7 +122,7 @@ class Humans:
                 setattr(self, name, None)
 
     def _created(self, body: Body) -> BodyPublishers:
-        """Publishers of a body; its URDF is published."""
+        """Create the publishers of a body and publish its URDF."""
         create, topic = self._node.create_publisher, f'/humans/bodies/{body.id}'
         count = len(body.joint_names)
         made = BodyPublishers(

@@ -29,7 +29,9 @@ MOST_IDS = 10_000
 
 def to_impact_markers(frame: str, stamp: int, impacts: Sequence[Impact], first: int,
                       lifetime: float) -> MarkerArray:
-    """Two markers for each impact that RViz deletes after ``lifetime`` s; ids from ``first`` on."""
+    """Make an arrow and a text for each impact, which RViz deletes after ``lifetime`` s. Both have
+    the same id: ``first`` and up, modulo MOST_IDS.
+    """
     header = to_header(stamp, frame)
     return MarkerArray(markers=[
         marker for number, impact in enumerate(impacts, first)
@@ -37,7 +39,9 @@ def to_impact_markers(frame: str, stamp: int, impacts: Sequence[Impact], first: 
 
 
 def to_arrows(message: MarkerArray) -> tuple[ImpactArrow, ...]:
-    """The arrows of such a message. Raises ValueError for one that is none."""
+    """Read the arrows of a message that to_impact_markers() made. Raises ValueError for an arrow
+    without two points or without a text.
+    """
     texts = {marker.id: marker.text for marker in message.markers if marker.ns == TEXTS}
     found = [marker for marker in message.markers
              if marker.ns == ARROWS and marker.action == Marker.ADD]

@@ -40,7 +40,9 @@ def impact_text(impact: Impact) -> str:
 
 
 def _values(impact: Impact, limits: BiomechanicalLimits) -> dict[str, str]:
-    """Figures with their units in the keys; 'unknown' for those of a bone without a region."""
+    """Return the figures as text, with units in the keys. For a bone without a region those that
+    need one are 'unknown': peak force, duration, limit, ratio.
+    """
     figures = {
         'approach_speed_m_s': impact.speed, 'effective_mass_kg': impact.effective_mass,
         'impulse_N_s': impact.impulse, 'peak_force_N': impact.peak_force,

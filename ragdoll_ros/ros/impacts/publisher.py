@@ -22,7 +22,7 @@ DEPTH = 100
 
 
 class ImpactPublisher:
-    """Has impacts recorded while a topic is subscribed, and publishes those of each tick."""
+    """Records impacts while a topic is subscribed, and publishes those of each tick."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -39,7 +39,7 @@ class ImpactPublisher:
         self._run = -1
 
     def configure(self, settings: NodeSettings) -> None:
-        """Take frame and limits of these settings."""
+        """Take frame, marker lifetime and limits from these settings, and end the recording."""
         self._frame, self._lifetime = settings.frame_id, settings.impact_marker_lifetime
         if settings.impact_limits != self._limits_name:
             self._limits_name = settings.impact_limits
@@ -54,7 +54,7 @@ class ImpactPublisher:
         self._worst, self._run = {}, -1
 
     def start(self, simulation: Simulation) -> None:
-        """Before a tick: begin or end the recording as there are subscribers or none."""
+        """Begin to record if there is a subscriber, else end it; to be called before a tick."""
         if not (has_subscribers(self._publisher) or has_subscribers(self._markers)):
             if self._recorded is not None or self._refused is not None:
                 self.stop()

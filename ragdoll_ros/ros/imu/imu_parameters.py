@@ -47,8 +47,8 @@ def check_imus(imus: Sequence[str], bones: Sequence[str]) -> None:
 
 
 def renamed_imus(imus: Sequence[str], change: SceneChange) -> tuple[str, ...]:
-    """The entries of bones that stay in a scene, by their new names, if topics may contain these;
-    one empty text for none.
+    """Return the entries of bones that stay in a scene, with their new names. Entries with a name
+    that no topic may contain are left out; one empty text if none remains.
     """
     found = []
     for text in map(str.strip, filter(str.strip, imus)):

@@ -38,7 +38,7 @@ class InputCounts:
 
     @contextlib.contextmanager
     def refusing(self, source: str) -> Iterator[None]:
-        """Refuse the input that raises a ModelError within, and count it."""
+        """Context manager: refuse and count the input if its handling raises a ModelError."""
         try:
             yield
         except ModelError as error:

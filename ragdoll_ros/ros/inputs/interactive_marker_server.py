@@ -1,4 +1,4 @@
-"""Interactive marker server: bones are dragged by the protocol of RViz's interactive markers.
+"""Interactive marker server: bones are dragged by RViz's interactive marker protocol.
 
 One marker per bone, with the bone's name and the pose of its centre of mass. A client (RViz, the
 page) calls the service once, follows the updates, and publishes feedback:
@@ -10,16 +10,16 @@ page) calls the service once, follows the updates, and publishes feedback:
 - KEEP_ALIVE: the hand stays where it is.
 - MOUSE_UP: release.
 
-``header.frame_id`` is the scene's frame or ``world``. A hand is identified by ``client_id`` and
-``marker_name``, as two RViz have the same id: several clients can drag at once, also one bone. A
-client without feedback for CLIENT_TIMEOUT is taken to be gone. Other feedback is refused and
-counted.
+``header.frame_id`` is the parameter ``frame_id`` or ``world``. A hand is identified by
+``client_id`` and ``marker_name`` together, as two RViz have the same id. Several clients can drag
+at once, and with different ids also one bone. The drag of a client without feedback for
+CLIENT_TIMEOUT ends. Other feedback is refused and counted.
 
 RViz Jazzy (rviz_default_plugins, interactive_markers 2.5) calls
-``<namespace>/get_interactive_markers``, expects each update's ``seq_num`` to be one more than the
-last, and starts over if it is not or if an update has a pose of an unknown marker. It needs no
-keep-alive updates. Both topics are reliable, depth 100. During a drag it sends a POSE_UPDATE with
-every frame and ignores our poses of that marker.
+``<namespace>/get_interactive_markers`` and expects each update's ``seq_num`` to be one more than
+the last. It starts over if that is not so, or if an update has a pose of an unknown marker. It
+needs no keep-alive updates. Both topics are reliable, depth 100. During a drag RViz sends a
+POSE_UPDATE with every frame and ignores our poses of that marker.
 """
 from __future__ import annotations
 
@@ -89,8 +89,9 @@ class InteractiveMarkerServer:
 
     def set_simulation(self, simulation: Simulation, settings: NodeSettings,
                        markers: InteractiveMarkers) -> None:
-        """Publish the markers of this simulation's scene and erase those of the last one's. Of a
-        simulation whose dolls have changed, those of the new dolls.
+        """Publish the markers of this simulation and erase those whose bones are gone. Of the same
+        simulation and frame, only markers of new bones are published. A new simulation ends all
+        drags.
         """
         last = frozenset() if self._markers is None else self._markers.names
         known = last if simulation is self._simulation and (
@@ -133,7 +134,7 @@ class InteractiveMarkerServer:
                                                                  self._simulation.state))
 
     def on_feedback(self, message: InteractiveMarkerFeedback) -> None:
-        """Move a hand as the feedback asks; see the list above."""
+        """Move a hand as the feedback asks; see the list in the docstring of the module."""
         with self._counts.refusing(FEEDBACK):
             self._apply(message)
 

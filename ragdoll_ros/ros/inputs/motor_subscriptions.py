@@ -17,9 +17,10 @@ STRENGTHS = '~/joint_strengths'
 class MotorSubscriptions:
     """Subscriptions to ~/pose_target, ~/motor_strength and ~/joint_strengths.
 
-    The first has names, positions and velocities as on joint_states, of any joints with motors;
-    positions or velocities may be left out, efforts are ignored. The second sets the strength of
-    all motors, 0 to 1; the third, as efforts, that of the motors of the joints or bones named.
+    ~/pose_target has names, positions and velocities as on joint_states, of any joints with motors;
+    positions or velocities may be left out, efforts are ignored. ~/motor_strength sets the strength
+    of all motors, 0 to 1. ~/joint_strengths sets, as efforts, the strengths of the motors of the
+    named joints or bones.
     """
 
     def __init__(self, node: Node, counts: InputCounts) -> None:
@@ -36,16 +37,16 @@ class MotorSubscriptions:
         return {'all motors': [each.topic_name for each in self._joints]}
 
     def on_pose_target(self, message: JointState) -> None:
-        """Set targets; a message that is wrong is refused and counted, all of it."""
+        """Set targets; a message that is wrong is refused as a whole and counted."""
         with self._counts.refusing(TARGET):
             self.simulation.set_pose_target(*joint_values(message))
 
     def on_strength(self, message: Float64) -> None:
-        """Set the strength of all motors; what is no strength is refused and counted."""
+        """Set the strength of all motors; a value outside 0 to 1 is refused and counted."""
         with self._counts.refusing(STRENGTH):
             self.simulation.set_strength(message.data)
 
     def on_joint_strengths(self, message: JointState) -> None:
-        """Set strengths; a message that is wrong is refused and counted, all of it."""
+        """Set strengths; a message that is wrong is refused as a whole and counted."""
         with self._counts.refusing(STRENGTHS):
             self.simulation.set_strength(joint_efforts(message))

@@ -1,4 +1,4 @@
-"""What stands for the simulation while no world is loaded, and what is said of it."""
+"""Stand-in for the simulation while no world is loaded, and the message that says so."""
 from __future__ import annotations
 
 from ...model.errors import ModelError
@@ -7,7 +7,7 @@ NO_WORLD = 'no world is loaded: load one by ~/load_world or by the parameter sce
 
 
 class NoWorldLoaded(ModelError):
-    """Something is asked of a world while there is none."""
+    """Raised by an operation on a world while none is loaded."""
 
     def __init__(self) -> None:
         super().__init__('', 'no world', 'one that is loaded')
@@ -17,7 +17,7 @@ class NoWorldLoaded(ModelError):
 
 
 class NoWorld:
-    """In the place of a simulation: whatever is asked of it raises NoWorldLoaded."""
+    """Stand-in for a simulation: access to any of its attributes raises NoWorldLoaded."""
 
     def __getattr__(self, name: str) -> object:
         raise NoWorldLoaded

@@ -59,7 +59,7 @@ class StateSubscription:
             self._after()
 
     def _set_joints(self, message: JointState) -> None:
-        """Doll by doll; all of the message is checked before any is set."""
+        """Set angles and rates doll by doll, after the whole message has been checked."""
         names, scene = list(message.name), self.simulation.scene
         values = dict(zip(('joint_angles', 'joint_rates'), joint_values(message), strict=True))
         given = []

@@ -43,10 +43,11 @@ class PushTarget(Protocol):
 
 
 class PushSubscriptions:
-    """Subscriptions to ~/force, cmd_vel, ~/push and ~/wrench_at; each topic is a channel of pushes.
+    """Subscriptions to ~/force, cmd_vel, ~/push and ~/wrench_at. Each of the first two is a channel
+    of pushes; ~/push has one for each frame, ~/wrench_at one for each bone.
 
-    ``name`` is the name of the node that is pushed, for another node that listens as well. All are
-    reliable: a best-effort subscription lost 3 of 40 messages that were sent right after matching.
+    ``name``: of the pushed node, if another node listens as well. All are reliable: a best-effort
+    subscription lost 3 of 40 messages that were sent right after matching.
     """
 
     def __init__(self, node: Node, counts: InputCounts, name: str = '~') -> None:
@@ -62,7 +63,7 @@ class PushSubscriptions:
 
     @property
     def settings(self) -> NodeSettings:
-        """Values of the node's parameters; the type of cmd_vel is one of them."""
+        """Values of the node's parameters. Setting them subscribes to cmd_vel with its type."""
         return self._settings
 
     @settings.setter
@@ -72,7 +73,7 @@ class PushSubscriptions:
 
     @property
     def subscriptions(self) -> list[Subscription]:
-        """All of them."""
+        """All present subscriptions."""
         return [*self._wrenches, *filter(None, [self.cmd_vel.subscription])]
 
     def on_force(self, message: Wrench) -> None:
@@ -102,7 +103,9 @@ class PushSubscriptions:
                 self.simulation.release('cmd_vel')
 
     def on_stamped_cmd_vel(self, message: TwistStamped) -> None:
-        """As on_cmd_vel; without a frame, as by many keyboards, it is in the world frame."""
+        """As on_cmd_vel. Without a frame, as from many keyboard programs, a message is in the world
+        frame; in any other frame it is refused.
+        """
         frame = message.header.frame_id
         if frame in ('', WORLD, self.settings.frame_id):
             self.on_cmd_vel(message.twist)
@@ -124,7 +127,7 @@ class PushSubscriptions:
             self._push('~/push', f'push {frame if local else WORLD}', bone, message.wrench, local)
 
     def on_wrench_at(self, message: MultiDOFJointState) -> None:
-        """Push bones at points of theirs, all that the message names or none."""
+        """Push bones at points of theirs. If a part of the message is wrong, nothing is pushed."""
         with self._counts.refusing(WRENCH_AT):
             for channel, push in pushes_at(message, self.simulation.scene, self.settings.frame_id,
                                            self.settings.push_timeout, self._limited_at):
@@ -149,7 +152,7 @@ class PushSubscriptions:
             self.simulation.release(channel)
 
     def _limited_at(self, name: str, vector: Vector3) -> Vector:
-        """Force or torque of ~/wrench_at, by the end of its name."""
+        """Limit a force or torque of ~/wrench_at. The end of ``name`` tells which it is."""
         limit, limit_name = self.settings.max_force, 'max_force'
         if name.endswith('torque'):
             limit, limit_name = limit * TORQUE_ARM, MAX_TORQUE_NAME
@@ -162,7 +165,9 @@ class PushSubscriptions:
 
 def limited(counts: InputCounts, source: str, name: str, vector: Vector3, limit: float,
             limit_name: str) -> Vector:
-    """The vector, shortened to ``limit``, which is counted. NotFinite if it is not finite."""
+    """Return the vector, shortened to ``limit`` if it is longer; this is counted as clamped. Raises
+    NotFinite.
+    """
     values = (vector.x, vector.y, vector.z)
     errors.check_finite(name, values)
     result, length = clamp_norm(values, limit)

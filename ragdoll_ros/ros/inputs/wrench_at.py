@@ -58,7 +58,9 @@ def pushes_at(message: MultiDOFJointState, scene: Scene, frame_id: str, duration
 
 
 def _point(path: str, vector: Vector3, half_extents: Vector) -> Vector:
-    """The point (3,) m; OutOfRange if it is away from the bone."""
+    """Return the point (3,) m. Raises NotFinite, or OutOfRange if it is outside the bone's bounding
+    sphere.
+    """
     point, radius = (vector.x, vector.y, vector.z), math.hypot(*half_extents)
     errors.check_finite(path, point)
     if math.hypot(*point) > REACH * radius:

@@ -24,8 +24,8 @@ def contact_names(scene: Scene, contacts: Contacts) -> list[str]:
 
 def to_contact_wrenches(frame: str, scene: Scene, stamp: int,
                         contacts: Contacts) -> MultiDOFJointState:
-    """The contacts' names, their poses as on ~/contacts, and the wrench on the first bone at that
-    point along the world axes, N and N m.
+    """The contacts' names, their poses as on ~/contacts, and the wrench on the first bone about the
+    contact point, along the world axes, N and N m.
     """
     return MultiDOFJointState(
         header=to_header(stamp, frame), joint_names=contact_names(scene, contacts),

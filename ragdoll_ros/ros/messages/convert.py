@@ -1,6 +1,7 @@
 """Conversion of arrays to messages, field by field.
 
-Each tick uses serialized templates instead (serialized.py), which are traced from these functions.
+Most messages of a tick use serialized templates instead (serialized.py), which are traced from
+these functions.
 """
 from __future__ import annotations
 
@@ -121,8 +122,9 @@ def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarr
 
 
 def to_imu(frame: str, flaws: ImuErrors, stamp: int, rate: np.ndarray, force: np.ndarray) -> Imu:
-    """Imu message (data_raw of REP 145, no orientation) of angular rate (3,) rad/s and specific
-    force (3,) m/s^2 in the sensor's ``frame``. Without noise the covariance is zero, unknown.
+    """Make an Imu message (data_raw of REP 145, no orientation) of angular rate (3,) rad/s and
+    specific force (3,) m/s^2 in the sensor's ``frame``. Without noise the covariances are zero,
+    which means unknown.
     """
     message = Imu(header=to_header(stamp, frame), angular_velocity=to_vector(rate),
                   linear_acceleration=to_vector(force))

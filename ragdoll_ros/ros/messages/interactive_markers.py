@@ -95,7 +95,9 @@ def _marker(bone: Bone, header: Header) -> InteractiveMarker:
 
 
 def _part_marker(bone: Bone, part: Part) -> Marker:
-    """Marker of a part of a bone; without a frame_id its pose is relative to the marker's."""
+    """Marker of a part of a bone. It has no frame_id, so its pose is relative to that of the
+    interactive marker.
+    """
     marker = Marker(action=Marker.ADD)
     set_shape(marker, part, SCALE)
     marker.pose = to_pose((*part.position, *part.orientation))

@@ -56,8 +56,8 @@ class SceneMarkers:
                   swings: SwingState | None = None) -> bytes:
         """Serialized MarkerArray of a state; ``stamp`` in ns. Deletes arrows of ended pushes.
 
-        The first message deletes all markers of the last scene. It has the surfaces, and each
-        hundredth after it.
+        The first message deletes all markers of the last scene. It and each hundredth message after
+        it contain the surfaces.
         """
         poses = np.concatenate([np.concatenate(
             state.poses(self._bones).compose(self._part_poses), axis=1), self._static_poses])
@@ -81,7 +81,9 @@ class SceneMarkers:
         return self._make_template(surfaces=True)
 
     def _make_template(self, first: bool = False, surfaces: bool = False) -> SerializedTemplate:
-        """Template of the bones' parts, poses (p, 7), and of the rods, end points (2 m, 3) m."""
+        """Make the template: parts of bones and static bodies with poses (p, 7), and rods with end
+        points (2 m, 3) m. ``first``: delete all other markers; ``surfaces``: with the surfaces.
+        """
         header, scene = to_header(STAMP_SENTINEL, self._frame), self._scene
         array = MarkerArrayBuilder()
         if first:
@@ -102,7 +104,7 @@ class SceneMarkers:
         return array.template(np.concatenate(poses), ends)
 
     def _push_markers(self, stamp: int, pushes: Sequence[Push], state: State) -> list[Marker]:
-        """Arrows of the active pushes, and DELETE for those of ended ones."""
+        """Arrows of the active pushes that have a force, and DELETE for those of ended ones."""
         arrows = [self._arrow(number, push, state) for number, push in enumerate(
             push for push in pushes if any(push.force))]
         deleted = [Marker(ns='push', id=number, action=Marker.DELETE)
@@ -125,7 +127,9 @@ class SceneMarkers:
 
 
 def _part_markers(header: Header, doll: Ragdoll, name: str) -> tuple[list[Marker], np.ndarray]:
-    """Markers of the parts of a doll's bones, and their poses (p, 7); ``name`` is the prefix."""
+    """Markers of the parts of a doll's bones, and the sentinels (p, 7) in place of their poses;
+    ``name`` is the prefix of their namespaces.
+    """
     parts = [(bone, number, part) for bone in doll.bones
              for number, part in enumerate(bone.shape.primitives)]
     poses = sentinels(1, (len(parts), 7))
@@ -141,7 +145,7 @@ def _part_markers(header: Header, doll: Ragdoll, name: str) -> tuple[list[Marker
 
 def _static_markers(header: Header, parts: Sequence[tuple[static_body.StaticBody, Part]]
                     ) -> tuple[list[Marker], np.ndarray]:
-    """Markers of the parts of static bodies, and their poses (p, 7)."""
+    """Markers of the parts of static bodies, and the sentinels (p, 7) in place of their poses."""
     poses = sentinels(1, (len(parts), 7))
     markers = []
     for number, ((body, part), row) in enumerate(zip(parts, poses.tolist(), strict=True)):
@@ -155,7 +159,7 @@ def _static_markers(header: Header, parts: Sequence[tuple[static_body.StaticBody
 
 def _surface_markers(header: Header, bodies: Sequence[static_body.StaticBody]
                      ) -> tuple[list[Marker], np.ndarray]:
-    """Markers of static bodies that are surfaces or planes, with nothing that changes."""
+    """Markers of static bodies that are surfaces or planes, in which no number changes."""
     markers = []
     for body in bodies:
         marker = Marker(header=header, ns=f'bodies/{body.name}', action=Marker.ADD,
@@ -177,7 +181,9 @@ def _rod_marker(header: Header, ends: np.ndarray) -> tuple[list[Marker], np.ndar
 
 
 def set_shape(marker: Marker, part: Part, scale: float = 1.0) -> None:
-    """Set a marker's type and size, ``scale`` times those of a part; of a hull its triangles."""
+    """Set a marker's type and size from those of a part times ``scale``; a hull becomes its
+    triangles.
+    """
     if isinstance(part.shape, Hull):
         vertices, faces = part.shape.mesh()
         set_triangles(marker, scale * vertices, faces)
@@ -187,7 +193,7 @@ def set_shape(marker: Marker, part: Part, scale: float = 1.0) -> None:
 
 
 def set_triangles(marker: Marker, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Make a marker that of triangles (t, 3) between vertices (v, 3), m."""
+    """Make a marker a list of triangles: ``faces`` (t, 3) of vertices (v, 3), m."""
     marker.type, marker.scale = Marker.TRIANGLE_LIST, to_vector((1.0, 1.0, 1.0))
     points = [to_point(vertex) for vertex in vertices]
     marker.points = [points[index] for index in faces.ravel().tolist()]

@@ -57,7 +57,7 @@ _ENDS = tuple(bytes(4 - length % 4) for length in range(4))
 
 
 def _padded(text: str) -> bytes:
-    """A string up to the next multiple of four bytes, where it begins at one."""
+    """Serialize a string that begins at a multiple of four bytes, and pad it to the next."""
     content = text.encode()
     return (len(content) + 1).to_bytes(4, 'little') + content + _ENDS[len(content) % 4]
 
@@ -68,8 +68,8 @@ _KEYS = tuple(map(_padded, (TIME, EXCESS, WORK_OF_PUSHES, WORK_OF_GRABS)))
 
 @lru_cache(1)
 def _status(name: str, run: int, urdf: str, scene: str) -> bytes:
-    """All between the stamp and what changes from tick to tick: the frame, one status of level 0,
-    the number of values, and those of the run.
+    """Serialize all between the stamp and what changes from tick to tick: the frame, one status of
+    level 0, the number of values, and the values that are constant in a run.
     """
     constant = {RUN: str(run), URDF: urdf, SCENE: scene}
     return b''.join((_padded(''), struct.pack('<IB3x', 1, 0), _padded(name), _padded(''),

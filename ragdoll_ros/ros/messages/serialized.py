@@ -34,9 +34,10 @@ class SerializedTemplate:
 
     @classmethod
     def trace(cls, make: Callable, *shapes: tuple[int, ...]) -> SerializedTemplate:
-        """Template of the messages that ``make(stamp_ns, *arrays)`` returns, arrays of ``shapes``.
+        """Make a template of the messages that ``make(stamp_ns, *arrays)`` returns, for arrays of
+        these ``shapes``.
 
-        ``make`` is called once with sentinel numbers; where they are found in the serialized
+        ``make`` is called once with sentinel numbers. Where these are found in the serialized
         message, later numbers are written. ValueError unless each is found once, in order.
         """
         arrays, used = [], 1
@@ -83,8 +84,8 @@ def _as_slice(places: np.ndarray) -> slice | np.ndarray:
 
 
 def serialize_pose_array(frame: str, stamp: int, poses: np.ndarray) -> bytes:
-    """Serialized PoseArray of poses (n, 7), for ~/contacts, whose count varies (~/poses:
-    SceneTemplates); layout: deserialize_pose_array().
+    """Serialize a PoseArray of poses (n, 7): for ~/contacts, as n varies and a template has a fixed
+    length. Layout: see deserialize_pose_array().
     """
     seconds, nanoseconds = divmod(stamp, SECOND)
     name = frame.encode() + b'\0'

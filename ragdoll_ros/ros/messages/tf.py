@@ -53,15 +53,15 @@ class TfPublisher:
         self._is_told = False
 
     def prepare(self, scene: Scene, frame: str, publish_tf: str) -> TfTemplate | None:
-        """The template for another scene, if that of this one has been needed; this may run beside
-        the ticks.
+        """Return a template for the next scene if there is one for the present scene, else None.
+        This may run beside the ticks.
         """
         return TfTemplate(scene, frame, publish_tf == 'root') if self._template else None
 
     def set_scene(self, scene: Scene, frame: str, publish_tf: str,
                   template: TfTemplate | None = None) -> None:
-        """Publish a scene's frames; ``frame`` names the world frame, ``publish_tf``: see
-        PUBLISH_TF, ``template``: of prepare().
+        """Publish a scene's frames from now on. ``frame`` names the world frame; ``publish_tf`` is
+        one of PUBLISH_TF; ``template`` is what prepare() returned.
         """
         self._make_template = partial(TfTemplate, scene, frame, publish_tf == 'root')
         self._template = template

@@ -30,7 +30,8 @@ class InvalidLaunchArguments(errors.RagdollError):
 
 
 def node_parameters(given: dict[str, str], is_installed: Callable[[str], bool]) -> dict:
-    """Parameters of the node by the launch arguments; ``is_installed(package)``.
+    """Return the parameters of the node for the launch arguments ``given``.
+    ``is_installed(package)``: whether a ROS package is installed.
 
     Raises InvalidLaunchArguments.
     """

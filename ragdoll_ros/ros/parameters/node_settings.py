@@ -133,7 +133,7 @@ class NodeSettings:
 
     @property
     def imu_response(self) -> ImuResponse:
-        """Soft mount and low-pass filter of each sensor, in the ranges of the descriptors."""
+        """Soft mount and low-pass filter of each sensor; the descriptors limit their values."""
         return ImuResponse(self.imu_mount_frequency, self.imu_mount_damping, self.imu_bandwidth)
 
 
@@ -154,7 +154,9 @@ class InvalidSettings(errors.RagdollError):
 
 
 def check(settings: NodeSettings, scene: Scene) -> None:
-    """Raise a RagdollError with all values that a descriptor's range cannot exclude."""
+    """Raise a RagdollError with all invalid values, except those outside a descriptor's range,
+    which rclpy refuses.
+    """
     found = [*_wrong_words(settings), *_wrong_names(settings, scene), *_wrong_sensors(settings,
                                                                                    scene)]
     if len(found) == 1:

@@ -87,8 +87,8 @@ class Parameters:
         self._node.add_post_set_parameters_callback(self._after_set)
 
     def follow(self, change: SceneChange) -> None:
-        """Take the scene after a change of its dolls: bones keep the sensors and pushes that the
-        parameters give them, by their new names.
+        """Take the scene after a change of its dolls. Sensors and the pushed bone stay on their
+        bones, under their new names; entries of what is gone are left out.
         """
         names, self.scene = change.bone_names, change.after
         named = {'pushed_bone': names.get(self.settings.pushed_bone)
@@ -109,7 +109,7 @@ class Parameters:
         return settings
 
     def unload(self) -> None:
-        """Have no bones, as there is no world."""
+        """Empty the parameter bone_names, as there is no world."""
         self._set_bone_names([])
 
     def is_unchanged_read_only(self, parameter: Parameter) -> bool:
@@ -178,7 +178,7 @@ class Parameters:
                 if getattr(self.settings, name) == before[name]}
 
     def _set_bone_names(self, names: Iterable[str]) -> None:
-        """Change the read-only parameter, as only the node may."""
+        """Set the parameter bone_names, which is read-only for all others."""
         descriptor = self._node.describe_parameter(BONE_NAMES)
         descriptor.read_only = False
         self._node.set_parameters([Parameter(

@@ -1,8 +1,9 @@
-"""The executor of the node: between ticks it takes messages only, all else ten times a second.
+"""The executor of the node: it takes messages before each tick, other entities less often.
 
-rclpy's executor collects all entities of a node and waits for them anew before each callback, and
-once more after it. With a page that shows dolls at rest that took half of the node's CPU time. To
-collect and poll them takes as long as a tick.
+Services, actions and timers are polled ten times a second, QoS events once a second. rclpy's
+executor collects all entities of a node and waits for them anew before each callback, and once more
+after it. This takes as long as a tick: with a page that shows dolls at rest, it took half of the
+node's CPU time.
 """
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ class NodeExecutor(SingleThreadedExecutor):
     """Makes the ticks of ``ticker`` itself, while there are any.
 
     Messages are taken just before a tick, which is when they begin to act. Other entities are
-    polled after a tick, where they are to be.
+    polled after a tick, if the ticker says so.
     """
 
     def __init__(self, ticker: Ticker) -> None:
@@ -54,7 +55,7 @@ class NodeExecutor(SingleThreadedExecutor):
                 callback.result()
 
     def _take_messages(self) -> None:
-        """Call the callbacks of all messages that have come."""
+        """Call the callbacks of all messages that have come, at most MAX_MESSAGES of a topic."""
         for node in self.get_nodes():
             for subscription in node.subscriptions:
                 take = subscription.handle.take_message

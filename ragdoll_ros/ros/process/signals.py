@@ -48,8 +48,8 @@ def run_uninterrupted(shutdown: Callable[[], None]) -> None:
 def run_until_signal(run: Callable[[], int]) -> int:
     """Call ``run`` and return its exit code, or 0 if the first shutdown signal ends it.
 
-    Further signals are ignored, also after the return. A callback of C code cannot be left by an
-    exception, as while machine code is loaded: the signal is then repeated after it.
+    Further signals are ignored, also after the return. If the signal arrives in a callback from C
+    code, as while machine code is loaded, its exception is lost; the signal is then repeated.
     """
     received = []
     report = sys.unraisablehook

@@ -30,9 +30,10 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Volume:
-    """A box by two corners, or a sphere by its centre and, as first number, its radius; (2, 3) m.
+    """A box by two corners, or a sphere by its centre and, as the first number of the second point,
+    its radius; ``points`` (2, 3) m, world frame.
 
-    Raises Refusal for other kinds and other points.
+    of() raises Refusal for other kinds and other points.
     """
 
     kind: Kind
@@ -40,7 +41,9 @@ class Volume:
 
     @classmethod
     def of(cls, kind: int, points: Sequence[Sequence[float]]) -> Volume | None:
-        """A volume, world frame; None: unbounded."""
+        """Make a volume of bounds in the world frame; None for EMPTY: unbounded. Raises Refusal for
+        other kinds than BOX and SPHERE, and for wrong points.
+        """
         if kind == Kind.EMPTY:
             return None
         if kind not in (Kind.BOX, Kind.SPHERE):
@@ -54,7 +57,9 @@ class Volume:
         return cls(Kind(kind), array)
 
     def overlaps(self, shape: Shape | Compound, pose: Pose) -> bool:
-        """Whether it overlaps a shape; a box, that shape's axis-aligned bounding box."""
+        """Whether the volume overlaps a shape; of a box, whether it overlaps the shape's
+        axis-aligned bounding box.
+        """
         if self.kind == Kind.SPHERE:
             centre = pose.apply_inverse(self.points[:1])
             return bool(shape.signed_distance(centre)[0] <= self.points[1, 0])
@@ -63,7 +68,9 @@ class Volume:
                     and (upper >= self.points.min(axis=0)).all())
 
     def may_overlap(self, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
-        """Whether spheres (n, 3), (n,) m may overlap it (n,): a quick test for many."""
+        """Whether the volume may overlap each sphere, (n,): a quick test. Spheres: (n,
+        3), (n,) m.
+        """
         if self.kind == Kind.SPHERE:
             return np.linalg.norm(centres - self.points[0], axis=1) <= radii + self.points[1, 0]
         lower, upper = self.points.min(axis=0), self.points.max(axis=0)
@@ -73,7 +80,7 @@ class Volume:
 
 def overlapping(entities: Sequence[Entity], volume: Volume, scene: Scene,
                 state: State) -> Iterator[Entity]:
-    """Those entities of which a bone or a part overlaps a volume."""
+    """Yield the entities of which a bone, or the shape of a static body, overlaps a volume."""
     radii = np.array([np.linalg.norm(bone.shape.half_extents) for bone in scene.bones])
     near = volume.may_overlap(state.positions, radii)
     for entity in entities:

@@ -1,4 +1,4 @@
-"""What a scene has to name: its dolls and static bodies, and each bone as doll/bone."""
+"""Entities of a scene: its dolls and static bodies by name, and each bone as doll/bone."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -100,7 +100,9 @@ class Entity:
 
 
 class Entities:
-    """The entities of a scene; ``infos`` of those that it has are as if set by set_info()."""
+    """The entities of a scene. ``infos``: infos by name, taken over as if set by set_info(), of
+    entities that the scene has.
+    """
 
     def __init__(self, scene: Scene, infos: Mapping[str, Info] | None = None) -> None:
         self._scene = scene
@@ -157,8 +159,8 @@ def _bodies(scene: Scene) -> Iterator[Entity]:
 
 
 def _category(doll: Ragdoll) -> Category:
-    """Human by the names of its joints or bones, or as a rigged character; else a robot if it has
-    joints.
+    """Classify a doll: human by the names of its joints or bones, or if it is fitted to a rigged
+    character; else a robot if it has joints, else an object.
     """
     names = {name for joint in doll.joints for name in joint.angle_names}
     if (names >= JOINTS or {bone.name for bone in doll.bones} >= HUMAN_BONES

@@ -51,7 +51,7 @@ class EntityServices:
 
     @property
     def entities(self) -> Entities:
-        """Those of the current scene. Infos are kept while dolls come and go."""
+        """The entities of the current scene. Infos are kept while dolls come and go."""
         simulation = self._controlled.simulation
         if simulation.scene is not self._scene:
             self._entities = Entities(simulation.scene, self._entities.infos if (
@@ -72,7 +72,9 @@ class EntityServices:
         self._fill_state(response.state, self.entities.find(request.entity))
 
     def _set_entity_state(self, request: Any, response: Any) -> None:
-        """Version 2 says what to set; version 1 sets pose and twist."""
+        """Set the state of an entity. A request of version 2 of the standard says whether to set
+        pose and twist; one of version 1 sets both.
+        """
         entity, state, frame = (self.entities.find(request.entity), request.state,
                                 request.state.header.frame_id)
         if frame not in ('', WORLD, self._controlled.settings.frame_id):
@@ -107,7 +109,9 @@ class EntityServices:
                                             tuple(info.tags)))
 
     def _get_entity_bounds(self, request: Any, response: Any) -> None:
-        """The upper corner comes first; what has no end, as a plane, has no bounds."""
+        """Fill in the bounding box, the upper corner first. What is unbounded, as a plane, gets no
+        bounds.
+        """
         simulation, entity = self._controlled.simulation, self.entities.find(request.entity)
         lower, upper = own_box(entity, simulation.scene, simulation.state)
         if not np.isfinite((lower, upper)).all():
@@ -124,7 +128,7 @@ class EntityServices:
             self.entities, simulation.scene, simulation.state)
 
     def _fill_state(self, state: Any, entity: Entity) -> Any:
-        """An EntityState; accelerations are not known and stay zero."""
+        """Fill an EntityState and return it; accelerations are not known and stay zero."""
         row = entity.state_row(self._controlled.simulation)
         state.header = to_header(self._controlled.stamp, self._controlled.settings.frame_id)
         state.pose = to_pose(row[:7].tolist())

@@ -22,7 +22,7 @@ class TagsMode(IntEnum):
 
 @dataclass(frozen=True)
 class Filters:
-    """What is empty, or None, does not filter."""
+    """Conditions on entities; one that is empty or None is always met."""
 
     name: str = ''
     """A POSIX extended regular expression, looked for in the name."""

@@ -2,8 +2,8 @@
 
 Python's module re tries alternatives one after the other, for which a short expression can take
 years. Here each part of an expression maps the set of places in the text where it may begin to the
-set of those where it may end. Without collating symbols, equivalence classes and back-references.
-https://pubs.opengroup.org/onlinepubs/9799919799/basedefs/V1_chap09.html#tag_09_04
+set of those where it may end. Collating symbols, equivalence classes and back-references are not
+supported. https://pubs.opengroup.org/onlinepubs/9799919799/basedefs/V1_chap09.html#tag_09_04
 """
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ class Pattern:
         self._part, self._left = _Parser(expression).parse(), MAX_WORK
 
     def is_in(self, text: str) -> bool:
-        """Whether some part of the text matches, as with grep -E. Raises Refusal if this and all
-        matches before take too long.
+        """Whether some part of the text matches, as with grep -E. Raises Refusal if all matches
+        with this pattern so far have taken more than MAX_WORK.
         """
         return bool(self._part(Text(text, self._spend), frozenset(range(len(text) + 1))))
 
@@ -183,7 +183,7 @@ class _Parser:
 
 
 def _repeat(part: Part, least: int, most: int | None) -> Part:
-    """``part`` at least and at most so many times; None: any number."""
+    """Repeat ``part`` from ``least`` to ``most`` times; None: any number."""
     def match(text: Text, places: Places) -> Places:
         for _ in range(least):
             after = part(text, places)

@@ -1,6 +1,6 @@
 """The simulation's state as the standard has it: stopped, playing or paused; and its reset.
 
-Stopped is paused at the start, as the node is with ``start_paused``, after a stop or a new world.
+Stopped means paused at the start: after a start with ``start_paused``, a stop, or loading a world.
 """
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class ControlledNode(Controlled, Protocol):
     """What the services act on: the ragdoll node."""
 
     def load_world(self, name: str) -> Loaded:
-        """A scene, for use_world(); may run beside the ticks."""
+        """Load a scene, for use_world(); may run beside the ticks."""
 
     def use_world(self, loaded: Loaded) -> SetParametersResult:
         """Replace the present world."""
@@ -61,7 +61,7 @@ class ControlledNode(Controlled, Protocol):
         """Stamp of the current state, ns."""
 
     def run_beside(self, make: Callable[[], Result]) -> Result:
-        """What ``make`` returns; ticks go on meanwhile."""
+        """Run ``make`` while the ticks go on, and return what it returns."""
 
     def change_dolls(self, prepare: Callable[[Simulation], PreparedChange]) -> None:
         """Add or remove dolls as ``prepare(simulation)`` says; time goes on, topics follow."""
@@ -77,7 +77,7 @@ class RunState:
 
     @property
     def run(self) -> tuple[Simulation, int, bool]:
-        """What a reset, a new scene or its end changes."""
+        """Identifies the run: a reset, a new scene or its end changes it."""
         controlled = self._controlled
         return (controlled.simulation, controlled.simulation.reset_count, controlled.has_world)
 
@@ -122,13 +122,13 @@ class RunState:
                           '1 (playing), 2 (paused) or 3 (quitting)')
 
     def stop(self) -> None:
-        """Pause, as stopped if the simulation is at its start."""
+        """Pause. The state is then stopped if the simulation is at its start, else paused."""
         if not self._controlled.paused:
             self._controlled.pause(True)
         self._stopped = self.run
 
     def reset(self, reset: Callable[[], object]) -> None:
-        """Go back to a start by ``reset()``, and go on as before: stopped, paused or playing."""
+        """Go back to a start by ``reset()``; the state stays stopped, paused or playing."""
         was_stopped = self.state == RunningState.STOPPED
         reset()
         if was_stopped:

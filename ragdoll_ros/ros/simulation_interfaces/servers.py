@@ -1,4 +1,7 @@
-"""Servers of the standard's services below the node's name, where simulation_interfaces is."""
+"""Servers of the standard's services, if the package simulation_interfaces is installed.
+
+Their names are below the node's name, as ~/get_entities.
+"""
 from __future__ import annotations
 
 import inspect
@@ -73,7 +76,9 @@ class SimulationInterfaces:
         self.status = f'{len(served)} services, 1 action'
 
     def destroy(self) -> None:
-        """Destroy the action's server, which the node does not, and end what is under way."""
+        """Destroy the action server, which the node does not destroy, and cancel a load that is
+        under way.
+        """
         if srv is not None:
             self._loader.cancel('the node ends')
         while self.actions:
@@ -110,5 +115,5 @@ class SimulationInterfaces:
 
 
 def snake_case(name: str) -> str:
-    """GetEntities as get_entities."""
+    """Convert a name such as GetEntities to get_entities."""
     return re.sub('(?<=[a-z])(?=[A-Z])', '_', name).lower()

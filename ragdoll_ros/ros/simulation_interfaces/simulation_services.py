@@ -169,15 +169,15 @@ class SimulationServices:
 
     @staticmethod
     def _fill(resource: Any, world: World) -> Any:
-        """A WorldResource."""
+        """Fill a WorldResource and return it."""
         resource.name, resource.description = world.name, world.description
         resource.world_resource.uri = world.uri
         return resource
 
 
 def features(served: Iterable[str], capabilities: Collection[Capability]) -> list[int]:
-    """Features of the action and of the services that are served, as numbers, ascending; without
-    spawning where the engine cannot.
+    """Return the features of the action and of the ``served`` services as numbers, ascending;
+    without those of spawning if the engine cannot add or remove dolls.
     """
     possible = {**SimulationServices.FEATURES, **EntityServices.FEATURES, **SpawnServices.FEATURES}
     found = {*SimulationServices.ACTION_FEATURES,

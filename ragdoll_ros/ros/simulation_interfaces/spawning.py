@@ -44,7 +44,7 @@ NAME = re.compile(r'[^\s/][^/\x00-\x1f]{0,99}')
 class SpawnServices:
     """Handlers, each ``(request, response)``, which raise Refusal.
 
-    ``messages``: the module simulation_interfaces.msg. ``entities()``: those of the scene.
+    ``messages``: the module simulation_interfaces.msg. ``entities()``: the entities of the scene.
     """
 
     FEATURES = {
@@ -71,7 +71,7 @@ class SpawnServices:
         return simulation is self._simulation and simulation.scene is not self._world
 
     def remove_spawned(self) -> None:
-        """Remove all dolls that have come; those that have gone stay away."""
+        """Remove all dolls that were spawned; those that were deleted stay away."""
         if not self.has_changed:
             return
         own = {id(placement) for placement in self._world.dolls}
@@ -87,7 +87,9 @@ class SpawnServices:
         response.entity_name = placed.name
 
     def _spawn_several(self, request: Any, response: Any) -> None:
-        """All that can be, in one change; those that cannot leave the others alone."""
+        """Spawn all entities that can be, in one change. One that cannot does not hinder the
+        others; Refusal is raised at the end.
+        """
         self._check_engine()
         if len(request.spawn_requests) > MOST_REQUESTS:
             raise Refusal(Code.OPERATION_FAILED, f'spawn_requests: {len(request.spawn_requests)}; '
@@ -113,10 +115,10 @@ class SpawnServices:
 
     def _placed(self, request: Any, read: dict[tuple[str, str], Found],
                 taken: set[str]) -> tuple[Placement, str]:
-        """What a SpawnEntity asks for, as it is to be placed, and notes on its resource.
+        """Return the placement that a SpawnEntity asks for, and notes on its resource.
 
-        ``read``: resources by uri and text, read once; ``taken``: names. The request of version 1
-        has the fields of a Resource. Raises Refusal.
+        ``read``: resources by uri and text, each read once; ``taken``: names in use. A request of
+        version 1 has the fields of a Resource itself. Raises Refusal.
         """
         if request.entity_namespace:
             raise Refusal(NAMESPACE_INVALID, f'entity_namespace: {request.entity_namespace[:60]!r};'
@@ -145,7 +147,9 @@ class SpawnServices:
         self._remove(entity.doll)
 
     def _get_spawnables(self, request: Any, response: Any) -> None:
-        """Sources that are no folders are named, and hinder nothing."""
+        """List what can be spawned. Sources that are no folders are named in the result and not an
+        error.
+        """
         found, response.result.error_message = self._controlled.run_beside(
             lambda: spawnables(request.sources))
         for each in found:

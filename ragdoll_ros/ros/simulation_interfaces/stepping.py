@@ -59,7 +59,7 @@ class Stepper:
             raise Refusal(Code.OPERATION_FAILED, f'{reason} after {order.made} of {steps} steps')
 
     def _on_timer(self) -> None:
-        """Make a step if there is somebody to tell, else steps for MAX_CALLBACK_TIME at most."""
+        """Make one step if the order has ``progress``, else steps for MAX_CALLBACK_TIME at most."""
         order, end = self._order, time.monotonic_ns() + MAX_CALLBACK_TIME
         while (reason := self._reason_to_end(order)) is None:
             self._controlled.tick()
@@ -73,7 +73,7 @@ class Stepper:
         order.done.set_result(reason)
 
     def _reason_to_end(self, order: Order) -> str | None:
-        """Why to make no more steps; empty: all are made; None: there are more to make."""
+        """Return why no more steps are made, '' if all are made, or None if more are to be made."""
         if order.made >= order.steps:
             return ''
         if order.is_cancelled():

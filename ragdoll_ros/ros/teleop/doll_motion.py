@@ -35,15 +35,15 @@ class DollMotion:
         return float(self._rows()[0].sum())
 
     def speed(self, direction: np.ndarray) -> float:
-        """Speed, m/s, along a unit vector (3,) of the root or of the doll's centre of mass, the
-        larger of both; the doll must have a mass.
+        """Speed, m/s, along a unit vector (3,): that of the first bone or of the doll's centre of
+        mass, whichever is larger. The doll must have a mass.
         """
         masses, velocities = self._rows()
         speeds = velocities @ direction
         return float(max(speeds[0], masses @ speeds / masses.sum()))
 
     def _rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Masses (n,) kg and velocities (n, 3) m/s of the doll's bones, the root first."""
+        """Masses (n,) kg and velocities (n, 3) m/s of the doll's bones, in the order of ~/state."""
         state = self._state()
         if state is None or not state.joint_names:
             return np.zeros(0), np.zeros((0, 3))

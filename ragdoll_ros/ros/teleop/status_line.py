@@ -39,7 +39,9 @@ class StatusLine:
         return float(self._values.get('real_time_factor', 1.0))
 
     def text(self, push: str = '') -> str:
-        """Real-time factor, time, push, tick cost and root; without a push it fits 80 columns."""
+        """Real-time factor, time, push, tick cost and first bone; without a push it fits 80
+        columns.
+        """
         if self.state is None or not self._values:
             return 'waiting for the node'
         values = self._values

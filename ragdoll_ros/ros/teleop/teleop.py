@@ -63,8 +63,8 @@ EXAMPLE = """examples:
 class NodeFinder:
     """The fully qualified ``name`` of a ragdoll node.
 
-    ``requested``: the name the user gave; '': ``ragdoll``, or another ragdoll node if that is not
-    there. Raises rclpy's InvalidTopicNameException for an invalid name.
+    ``requested``: the name the user gave; '': ``ragdoll``, or the only other ragdoll node if that
+    is not there. Raises rclpy's InvalidTopicNameException for an invalid name.
     """
 
     def __init__(self, node: Node, requested: str) -> None:
@@ -104,7 +104,7 @@ class NodeFinder:
 class Teleop(Node):
     """Publishes pushes to a ragdoll node and calls its services; ``requested``: see NodeFinder.
 
-    ``top_speed``: m/s that a held key brings the doll to; None: it always pushes with its force.
+    ``top_speed``: m/s that a held key brings the doll to; None: a held key pushes with full force.
     """
 
     def __init__(self, requested: str = '', top_speed: float | None = TOP_SPEED) -> None:

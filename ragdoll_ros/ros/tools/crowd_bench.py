@@ -37,7 +37,9 @@ HIGH, LOW = 'position: [0, 0, 50]', 'position: [0, 0, 0]'
 
 
 def node_arguments(folder: Path, count: int, pose: str) -> list[str]:
-    """Arguments of a node with ``count`` default dolls 2.5 m apart and one thread per core."""
+    """Write a scene of ``count`` default dolls 2.5 m apart, and return the arguments of a node for
+    it with one thread per core.
+    """
     file = folder / f'scene_{count}_{len(pose)}.yaml'
     repeat = f', repeat: {{count: {count}, grid: [2.5, 2.5, 0]}}' if count > 1 else ''
     file.write_text(f'ground: {{normal: [0, 0, 1], offset: 0}}\n'
@@ -106,7 +108,9 @@ def without_subscriber(node: Node, folder: Path, *counts: int) -> None:
 
 def with_subscriber(folder: Path, count: int, pose: str, seconds: float,
                     wait_ready: Callable[[], None] = lambda: None) -> None:
-    """Print the statistics of a subscriber to ~/poses, started after ``wait_ready``, and load."""
+    """Print the statistics of a subscriber to ~/poses, started after ``wait_ready``, and the node's
+    CPU load.
+    """
     listen = ['--seconds', str(seconds), TOPIC]
     with child_process('ros.node', node_arguments(folder, count, pose),
                        stderr=subprocess.DEVNULL) as process:

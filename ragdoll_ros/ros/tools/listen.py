@@ -53,7 +53,9 @@ class TopicStatistics:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Listen from the first message of every topic on, and print a line for each."""
+    """Wait for a message of every topic, then listen for ``--seconds``, and print a line
+    for each.
+    """
     arguments = sys.argv if arguments is None else arguments
     parser = argparse.ArgumentParser(
         'python -m ragdoll_ros.ros.tools.listen', description=__doc__, epilog=EXAMPLE,

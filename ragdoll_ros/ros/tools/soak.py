@@ -168,7 +168,7 @@ def growth(samples: Sequence[SoakSample]) -> tuple[float, float]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the soak test. Returns 1 if something grew or a bad state was found."""
+    """Run the soak test. Returns 1 if something grew, a bad state was found, or no poses came."""
     parser = argparse.ArgumentParser(
         'python -m ragdoll_ros.ros.tools.soak', description=__doc__.partition('\n')[0],
         epilog='example: python -m ragdoll_ros.ros.tools.soak --ticks 20000')

@@ -95,8 +95,8 @@ def _enter_joint(body: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, in
 
 
 def energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) -> np.ndarray:
-    """Energy scale m g L (1,), J: m of all bodies, L the largest reach of a geom; of those that
-    gravity moves.
+    """Energy scale m g L (1,), J, of the bodies that are not kinematic: m their total mass, L the
+    largest reach of one of their geoms.
     """
     falls = tree['kinematic'] == 0
     reach = geoms['reach'][falls[geoms['body']]].max(initial=0.0)
@@ -156,8 +156,9 @@ def contact_laws(scene: Scene) -> np.ndarray:
 
 def make_pairs(geom_pairs: np.ndarray, laws: np.ndarray,
                points: np.ndarray | int = 0) -> np.ndarray:
-    """GEOM_PAIR records of pairs of geoms (p, 2), by the ``laws`` (g, 3) of their materials;
-    ``points`` (p,) of what is paired with planes.
+    """Make GEOM_PAIR records of pairs of geoms (p, 2), by contact_law() of the ``laws`` (g, 3) of
+    their materials. ``points`` (p,): for a pair with a plane, which point of the other geom may
+    touch it; else 0.
     """
     pairs = np.zeros(len(geom_pairs), GEOM_PAIR)
     if len(geom_pairs):
@@ -169,8 +170,9 @@ def make_pairs(geom_pairs: np.ndarray, laws: np.ndarray,
 
 
 def contact_law(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Friction, rolling friction and restitution (..., 3) between two materials (..., 3): geometric
-    means, of rolling friction the mean; if one friction is unlimited, that of the other counts.
+    """Friction, rolling friction, m, and restitution (..., 3) of contacts between two materials
+    (..., 3). Rolling friction is the arithmetic mean, the others are geometric means; if one
+    friction is infinite, that of the other is taken. Friction is at most NO_SLIP.
     """
     (friction_a, rolling_a, restitution_a), (friction_b, rolling_b, restitution_b) = (
         np.moveaxis(law, -1, 0) for law in (a, b))

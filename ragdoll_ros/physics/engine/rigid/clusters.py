@@ -51,7 +51,7 @@ PARTS_PER_THREAD = 4
 
 @dataclass
 class Cluster:
-    """Dolls that are integrated as one system, with what static geoms are near."""
+    """Dolls that are integrated as one system, and the static geoms near them."""
 
     dolls: np.ndarray
     """(d,) in the scene's order."""
@@ -153,7 +153,9 @@ class Clusters:
         return iter(self.members)
 
     def reach(self) -> np.ndarray:
-        """Distance (n,) m of each bone's farthest point from its center of mass."""
+        """Upper bound (n,) m on the distance of each bone's farthest point from its
+        center of mass.
+        """
         reach = np.zeros(len(self._scene.bones))
         for system, bones in zip(self._systems, self._bones, strict=True):
             np.maximum.at(reach, bones[system.tree['bone'][system.geoms['body']]],
@@ -243,8 +245,8 @@ class Clusters:
                 cluster.state.dense_step[:] = 0
 
     def set_motion(self, dolls: Sequence[int], q: np.ndarray, v: np.ndarray) -> None:
-        """Set the coordinates and velocities of kinematic dolls to their own in those of the scene
-        (nq,), (nv,); the contacts of their clusters are kept.
+        """Set the coordinates and velocities of kinematic ``dolls`` to theirs in ``q`` (nq,) and
+        ``v`` (nv,) of the scene; the contacts of their clusters are kept.
         """
         for doll in dolls:
             self.q[self._q[doll]], self.v[self._v[doll]] = q[self._q[doll]], v[self._v[doll]]
@@ -255,9 +257,10 @@ class Clusters:
             cluster.state.stats['gaps_current'] = 0
 
     def set_kinematic(self, doll: int, kinematic: bool) -> None:
-        """Let a doll move at its velocities, whatever acts on it, or no more. It has no contacts
-        with itself, its limits and the ground while it does; what overlaps of it then does not
-        collide until it separates.
+        """Make a doll kinematic, so that it moves at its velocities whatever acts on it, or end
+        that. A kinematic doll has no contacts with itself, static bodies and the ground, and no
+        joint limits. When that ends, its geoms that overlap do not collide until they separate, nor
+        those with a joint outside its limits between them until it is inside.
         """
         self.yielding[doll] = not kinematic
         cluster, single = self.members[self.of_doll[doll]], self._singles[doll]
@@ -273,12 +276,14 @@ class Clusters:
             _invalidate(one)
 
     def follow_twists(self, dolls: list[int]) -> None:
-        """Mark that the twists of dolls were set: their contacts take the new ones."""
+        """Mark that the twists of ``dolls`` were set: in the next advance() what touches them
+        follows at once.
+        """
         self.stats['twist_changed'][self._firsts[self.of_doll[dolls]]] = 1
 
     def set_doll(self, doll: int, q: np.ndarray, v: np.ndarray) -> None:
-        """Set the coordinates and velocities of a doll to its own in those of the scene (nq,),
-        (nv,), and discard what its cluster has computed from the old ones.
+        """Set the coordinates and velocities of a doll to its own in ``q`` (nq,) and ``v`` (nv,) of
+        the scene, and discard what its cluster has computed from the old ones.
         """
         self.q[self._q[doll]], self.v[self._v[doll]] = q[self._q[doll]], v[self._v[doll]]
         cluster = self.members[self.of_doll[doll]]
@@ -302,8 +307,8 @@ class Clusters:
             cluster.state.excluded[:] = own | KINEMATIC * (not yields)
 
     def exclude_overlaps(self, doll: int) -> None:
-        """Exclude those pairs of geoms of a doll that overlap in its next state, until they
-        separate, and those that only a joint outside its limits brings together.
+        """Exclude those pairs of geoms of a doll that overlap in the state that is set next, until
+        they separate, and those with a joint outside its limits between them, until it is inside.
         """
         for one in (self._singles[doll], self.members[self.of_doll[doll]]):
             excluded = self._own_excluded(one, doll)
@@ -351,16 +356,16 @@ class Clusters:
         return self.stats[name].sum() + self.departed[name][0]
 
     def ledger(self) -> dict[str, int]:
-        """What all steps since the start are made of; see LEDGER."""
+        """Counters of what all steps since the start are made of; see LEDGER."""
         counted = ('steps', 'impacts', 'flight_steps', 'sweeps')
         both = np.concatenate([self.stats, self.departed])
         return {**{name: int(both[name].sum()) for name in counted},
                 **{name: int(both['ledger'][name].sum()) for name in LEDGER.names}}
 
     def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Contacts (c,) of each cluster's last step; clusters in flight have none. With what
-        touches, (c, 3): two bones of the scene, or GROUND, and the static body, or GROUND; and the
-        length (c,) s of the step.
+        """Contacts (c,) of each cluster's last step, without joint limits; clusters in flight have
+        none. Also what touches, (c, 3), as indices in the scene: a bone, another bone or GROUND,
+        and a static body or GROUND; and the length (c,) s of the step.
         """
         if len(self._singles) == 1:
             return self._points_of(self.members[0], self._bone_of_body)
@@ -376,7 +381,9 @@ class Clusters:
         return tuple(map(np.concatenate, zip(*found, strict=True)))
 
     def on_ground(self) -> np.ndarray:
-        """Which bones (n,) have a ground contact; of one doll ten times as fast as contacts()."""
+        """Which bones (n,) have a contact with the ground or a static body; in a scene of one doll
+        ten times as fast as contacts().
+        """
         on = np.zeros(len(self._bone_of_body), bool)
         if len(self._singles) == 1:
             known = _known_contacts(self.members[0])
@@ -396,7 +403,9 @@ class Clusters:
                               np.full(len(known), cluster.state.stats['last_dt'][0]))
 
     def static_bodies(self, cluster: Cluster) -> np.ndarray:
-        """Indices (s,) of the static bodies that the last geoms of a cluster are of."""
+        """Static body (s,), as an index in the scene, of each of the s static geoms of a cluster,
+        which are its last geoms.
+        """
         _, near = self.static_geoms.bones_and_geoms(cluster.static_keys)
         return self.static_geoms.bodies[np.unique(near)]
 
@@ -411,7 +420,9 @@ class Clusters:
         return bodies
 
     def _collect_impacts(self, clusters: Iterable[Cluster], since: float) -> None:
-        """Read the logs of clusters that were advanced from ``since`` s on."""
+        """Read the impact logs of clusters; their times count from ``since`` s after the start of
+        the advance.
+        """
         for cluster in clusters:
             count, log = int(cluster.state.impact_count[0]), cluster.state.impact_log
             if count:
@@ -436,8 +447,8 @@ class Clusters:
             _restore(*saved)
 
     def continue_from(self, other: Clusters, change: SceneChange) -> None:
-        """Take the states of the dolls that stay, and the clusters of which all do, from those of
-        the scene before. Dolls of other clusters become clusters by themselves.
+        """Take from ``other``, of the scene before the change, the states of the dolls that stay,
+        and the clusters of which no doll goes. All other dolls become clusters by themselves.
         """
         for doll, old in enumerate(change.old_dolls):
             if old >= 0:
@@ -471,7 +482,9 @@ class Clusters:
                 self._scatter_state(cluster)
 
     def checkpoint(self) -> dict[str, np.ndarray]:
-        """The fields CHECKPOINT of all states; as bytes, as numpy copies records slowly."""
+        """Copy the fields CHECKPOINT of all states, and the statistics of departed dolls, as bytes,
+        because numpy copies records slowly.
+        """
         return {'departed': self.departed.view(np.uint8).copy(), **{
             name: self._states.arrays[name].view(np.uint8).copy() for name in CHECKPOINT}}
 
@@ -491,8 +504,9 @@ class Clusters:
             self.departed['ledger'][name] += other.stats['ledger'][name][gone].sum()
 
     def _moved(self, cluster: Cluster, other: Clusters, change: SceneChange) -> Cluster:
-        """A cluster of ``other`` with the indices of the scene after a change, in which all of its
-        dolls are; its state is shared.
+        """A cluster of ``other``, all of whose dolls stay, with the indices of the scene after a
+        change. Its state is shared, but for the statistics; a single doll's cluster is this scene's
+        own.
         """
         dolls = change.new_dolls[cluster.dolls]
         if other._is_single(cluster):
@@ -557,7 +571,8 @@ class Clusters:
 
     def _advance_by_islands(self, cluster: Cluster, duration: float, accuracy: Accuracy) -> bool:
         """Advance a cluster by ``duration`` s in windows in which it falls into islands. Returns
-        whether it does, or is to be advanced as a whole instead.
+        whether it was advanced; not, if loads or springs act or the first window has no islands:
+        then it is to be advanced as a whole.
         """
         if len(cluster.state.loads) or len(cluster.state.springs):
             return False
@@ -590,7 +605,9 @@ class Clusters:
 
     def _form_islands(self, cluster: Cluster, label: np.ndarray,
                       before: dict[bytes, Cluster]) -> dict[bytes, Cluster]:
-        """Islands of a cluster by ``label`` (d,); those of the window ``before`` remain."""
+        """Form the islands of a cluster by ``label`` (d,); an island of the window ``before`` that
+        has the same dolls is kept.
+        """
         made = {}
         for number in np.unique(label):
             dolls = cluster.dolls[label == number]
@@ -606,7 +623,7 @@ class Clusters:
         return [self._singles[doll].state.excluded for doll in cluster.dolls]
 
     def _scatter_state(self, cluster: Cluster) -> None:
-        """Copy the state of a cluster of several dolls into the scene's arrays."""
+        """Copy the state of a cluster that has a state of its own into the scene's arrays."""
         self.q[cluster.q_indices], self.v[cluster.v_indices] = cluster.state.q, cluster.state.v
         self.bone_states[cluster.bones] = cluster.state.bone_states
         self.contact_impulses[cluster.bones] = cluster.state.contact_impulses
@@ -640,7 +657,9 @@ class Clusters:
         return made
 
     def _join(self, dolls: np.ndarray, pairs: np.ndarray, keys: np.ndarray) -> Cluster:
-        """A cluster that has a state of its own; ``keys``: what static geoms are near."""
+        """Make a cluster that has a state of its own; ``keys`` (s,): its pairs of bones and static
+        geoms that may touch.
+        """
         systems = [self._systems[doll] for doll in dolls]
         bones, q, v = (np.concatenate([parts[doll] for doll in dolls])
                        for parts in (self._bones, self._q, self._v))
@@ -661,9 +680,9 @@ class Clusters:
 
     def _static_pairs(self, systems: list[System], bones: np.ndarray,
                       keys: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pairs (p, 2) of geoms of joined ``systems`` with static ones, which follow them; which
-        points (p,) of geoms those with planes are of; and the static ones, indices (s,) among the
-        scene's.
+        """Pairs (p, 2) of geoms of joined ``systems`` with static geoms, which are numbered after
+        them, by ``keys``. Also, for pairs with planes, which point (p,) of the geom may touch it,
+        else 0; and the indices (s,) of the static geoms in the scene.
         """
         bone_of_geom = np.concatenate([
             own[system.tree['bone'][system.geoms['body']]] for system, own in zip(
@@ -684,8 +703,8 @@ class Clusters:
 
 
 def _pairs_of_dolls(dolls: np.ndarray, systems: list[System], pairs: np.ndarray) -> np.ndarray:
-    """All pairs (p, 2) of the geoms of ``dolls`` (d,) with the ``systems`` that ``pairs`` (k, 2)
-    of dolls connect; geoms count through all systems.
+    """All pairs (p, 2) of geoms of the ``dolls`` (d,) that ``pairs`` (k, 2) of dolls connect; geoms
+    are numbered through the ``systems`` of all dolls.
     """
     firsts = np.cumsum([0, *(len(system.geoms) for system in systems)])
     place = {int(doll): k for k, doll in enumerate(dolls)}
@@ -697,7 +716,9 @@ def _pairs_of_dolls(dolls: np.ndarray, systems: list[System], pairs: np.ndarray)
 
 
 def _every_pair(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """All pairs (p, 2) of indices ``a`` and ``b``, those of one of ``a`` one after the other."""
+    """All pairs (p, 2) of an index of ``a`` and one of ``b``, in the order of ``a``, then
+    of ``b``.
+    """
     return np.stack(np.meshgrid(a, b, indexing='ij'), -1).reshape(-1, 2)
 
 
@@ -706,7 +727,7 @@ def _cluster_key(dolls: np.ndarray, pairs: np.ndarray, keys: np.ndarray) -> tupl
 
 
 def _tolerances(accuracy: Accuracy) -> tuple[float, float, float, float]:
-    """What kernels.advance() takes of an accuracy."""
+    """The arguments of kernels.advance() that come from an accuracy, in their order."""
     return accuracy.step, accuracy.flight_error, accuracy.solve_error, accuracy.touching
 
 
@@ -725,7 +746,7 @@ def _saved(cluster: Cluster) -> tuple[Cluster, ClusterState, list[tuple]]:
 
 
 def _restore(cluster: Cluster, state: ClusterState, islands: list[tuple]) -> None:
-    """Write the copies of its state and of its islands' back to a cluster."""
+    """Write the saved copies of the states of a cluster and of its islands back to them."""
     cluster.islands = [island for island, *_ in islands]
     for saved in islands:
         _restore(*saved)
@@ -735,14 +756,16 @@ def _restore(cluster: Cluster, state: ClusterState, islands: list[tuple]) -> Non
 
 
 def _bind_cluster(*parts: object) -> Cluster:
-    """A Cluster of these parts, with the bundles of its system, state and workspaces."""
+    """Make a Cluster from ``parts``, its fields up to ``workspaces``, and bind system, state and
+    workspaces.
+    """
     system, state, workspaces = parts[-3:]
     return Cluster(*parts, [bind(part) for part in (system, state, *workspaces)])
 
 
 def _bound_alike(rows: list[np.ndarray], workspace: Workspace) -> list[np.ndarray]:
-    """Rows that bind a workspace, by those of another one that differs from it in OWN_SCRATCH:
-    to bind all of its arrays would take most of the time in which dolls come and go.
+    """Rows that bind ``workspace``, made from the ``rows`` of another one that differs only in
+    OWN_SCRATCH: to bind all of its arrays would take most of the time of adding and removing dolls.
     """
     row, at = rows[0].copy(), 0
     for name, part in zip(workspace._fields, workspace, strict=True):
@@ -770,8 +793,8 @@ def _each_doll(scene: Scene, like: Clusters | None) -> tuple[list[System], list[
 
 
 def _keys(scene: Scene) -> list[tuple[object, ...]]:
-    """What determines the system of each doll in a scene. An animated one's changes when it goes
-    limp: no other doll has the same, nor has the same doll in another scene.
+    """A key for each doll of a scene: dolls of equal keys have the same system. The system of an
+    animated doll changes when it goes limp, so its key is unique to the doll and the scene.
     """
     return [(id(placement.doll), placement.is_kinematic, placement.fixed_root)
             if not placement.is_animated

@@ -9,10 +9,11 @@ from ..protocol import GROUND
 def contact_points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,
                    static: np.ndarray,
                    dt: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Contacts that are no limits, with what touches and times as Clusters.contacts() returns them.
+    """Contacts that are no joint limits, with what touches and lengths of steps as
+    Clusters.contacts() returns them.
 
-    Their bodies count from ``first`` (c,) in ``bone_of_body``, which gives bones of the scene;
-    ``static`` (c,): static bodies, or GROUND.
+    Bodies of a contact count from ``first`` (c,) in ``bone_of_body``, the bones of the scene;
+    ``static`` (c,): static bodies, or GROUND; ``dt`` (c,): lengths of steps, s.
     """
     found = np.flatnonzero(contacts['kind'] != LIMIT)
     # take: an index in brackets copies such wide records field by field
@@ -23,7 +24,9 @@ def contact_points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.nda
 
 def bone_pairs(records: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,
                static: np.ndarray) -> np.ndarray:
-    """What touches, (c, 3), as Clusters.contacts() returns it, of CONTACTs or IMPACTs (c,)."""
+    """What touches in each of the CONTACTs or IMPACTs (c,): (c, 3), as Clusters.contacts() returns
+    it.
+    """
     a, other = bone_of_body[first + records['body_a']], records['body_b']
     b = np.where(other < 0, GROUND, bone_of_body[first + other])
     return np.stack([a, b, static], 1)

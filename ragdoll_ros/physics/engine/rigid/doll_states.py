@@ -58,7 +58,7 @@ class DollStates(Sequence):
         return begin + np.arange(len(begin)), np.repeat(np.arange(len(counts)), counts)
 
     def copy(self, doll: int, other: DollStates, old: int) -> None:
-        """Copy the state of doll ``old`` of ``other``, an equal one, to ``doll``."""
+        """Copy to ``doll`` the state of the equal doll ``old`` of ``other``."""
         for name in (*SNAPSHOT, 'contacts'):
             getattr(self._each[doll], name)[:] = getattr(other._each[old], name)
 

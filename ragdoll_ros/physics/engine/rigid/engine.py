@@ -152,7 +152,7 @@ class RigidEngine:
         self._twisted += dolls.tolist()
 
     def _in_clusters_of(self, dolls: Sequence[int]) -> np.ndarray:
-        """Which dolls (d,) are in the clusters of some."""
+        """Which dolls (d,) are in a cluster of one of ``dolls``."""
         named = np.zeros(len(self.cluster_of_doll), bool)
         named[self.cluster_of_doll[dolls]] = True
         return named[self.cluster_of_doll]
@@ -336,9 +336,10 @@ class RigidEngine:
             clusters.form(clusters.pairs)
 
     def _pairs_to_form(self, duration: float) -> np.ndarray | None:
-        """Pairs (k, 2) of dolls of which clusters are to be formed; None: they hold. Wakes dolls
-        that may be touched. Clusters that hold stay as they are: their last digits do not depend on
-        what others do.
+        """Pairs (k, 2) of dolls from which to form clusters, or None if all clusters stay as they
+        are. A cluster is renewed if it is older than MAX_AGE, or if a pair that it does not know,
+        or one with a sleeping doll, may touch within ``duration`` s; sleeping dolls near it wake.
+        All others are kept, so that their last digits do not depend on other dolls.
         """
         clusters, of_doll = self._clusters, self.cluster_of_doll
         near = self._near_pairs(duration)
@@ -365,7 +366,9 @@ class RigidEngine:
         self.sleeping[dolls] = False
 
     def _near_pairs(self, ahead: float) -> np.ndarray:
-        """Pairs (k, 2) of dolls that may touch within ``ahead`` s, one of each awake."""
+        """Pairs (k, 2) of dolls that may touch within ``ahead`` s, at least one awake and one not
+        kinematic.
+        """
         # Bodies that do not yield have no contacts with each other.
         return self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
                                        self._yielding, self.cluster_of_doll)
@@ -426,7 +429,9 @@ class RigidEngine:
         self._update_state()
 
     def _in_root_axes(self, coordinates: GeneralizedState) -> np.ndarray:
-        """Their velocities (nv,), with those of the roots' rotation along the roots' axes."""
+        """Velocities (nv,) of ``coordinates``, with the roots' angular velocities along the roots'
+        axes.
+        """
         v = coordinates.v.copy()
         orientations = rotation.inverse(coordinates.q[self.layout.root_orientations])
         v[self._spins] = rotation.rotate(orientations, v[self._spins])

@@ -32,7 +32,7 @@ NO_HULLS = HullTables(np.zeros(0, HULL_VERTEX), np.zeros(0, HULL_FACE), np.zeros
 
 
 def hull_tables(hull: Hull) -> HullTables:
-    """Those of one hull, about its centroid."""
+    """Tables of one hull, with its centroid as the origin."""
     triangles = hull.triangles
     corners = triangles.corners - hull.centroid
     vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
@@ -62,7 +62,7 @@ def hull_tables(hull: Hull) -> HullTables:
 
 
 def hull_geom(hull: Hull, pose: Pose) -> np.ndarray:
-    """GEOM (1,) of a hull at a pose, but for its body."""
+    """GEOM (1,) of a hull at a pose, but for body, law and indices."""
     geom = np.zeros(1, GEOM)
     radius = np.linalg.norm(hull.vertices - hull.centroid, axis=1).max()
     geom['kind'], geom['size'] = HULL, (radius, 0, 0)
@@ -90,8 +90,8 @@ def join_hulls(parts: Sequence[HullTables]) -> HullTables:
 
 
 def _by_faces(faces: np.ndarray, size: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Triangles (t,), HULL_FACE, in another order: first one of each flat face, then the others,
-    which get its plane; and the triangles of each face, indices.
+    """Reorder triangles (t,), HULL_FACE: first one of each flat face, then the others, which get
+    the plane of their face. Also returns the indices of the triangles of each face.
     """
     planes = np.column_stack([faces['normal'], faces['offset'] / size])
     left, groups = np.arange(len(planes)), []

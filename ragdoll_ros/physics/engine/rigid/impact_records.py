@@ -9,8 +9,9 @@ from ..protocol import Impacts
 
 
 def logged_impacts(log: np.ndarray, pairs: np.ndarray, since: float, dropped: int) -> Impacts:
-    """Impacts of the entries (c,) of a log that began ``since`` s after the advance, with what
-    meets, (c, 3) as Clusters.contacts() returns it, and the number of those without room.
+    """Impacts of the entries (c,) of a log whose times count from ``since`` s after the start of
+    the advance. ``pairs``: what meets, (c, 3) as Clusters.contacts() returns it; ``dropped``:
+    number of impacts for which the log had no room.
     """
     return Impacts(*pairs.T, log['time'] + since, log['point'].copy(), log['normal'].copy(),
                    log['speed'].copy(), log['impulse'].copy(), log['effective_mass'].copy(),

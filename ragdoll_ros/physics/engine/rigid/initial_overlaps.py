@@ -28,8 +28,9 @@ FIRST_BODY = GROUND - 1
 def find_overlaps(scene: Scene, clusters: Clusters, broad_phase: BroadPhase, layout: DofLayout,
                   q: np.ndarray) -> tuple[Overlap, ...]:
     """Overlaps deeper than TOLERANCE at coordinates ``q`` (nq,), the deepest first, one for each
-    bone and what it is in. Bones of a doll that are as deep in each other at joint angles of zero
-    are left out: the doll is made so. Leaves ``clusters`` in another state.
+    bone and what it is in. Those within a doll that exist at joint angles of zero as well, and are
+    there less than TOLERANCE shallower, are left out: the doll is made so. Leaves ``clusters`` in
+    another state.
     """
     found = _depths(scene, clusters, broad_phase, q)
     if any(_is_within_doll(scene, pair) for pair in found):
@@ -66,7 +67,9 @@ def _depths(scene: Scene, clusters: Clusters, broad_phase: BroadPhase,
 
 
 def _overlapping(scene: Scene, clusters: Clusters) -> Iterator[tuple[Pair, float]]:
-    """What overlaps, and the depth, m, of each pair of geoms."""
+    """Yield all that overlaps by more than TOLERANCE: the Pair and the depth, m, of each bone in
+    the ground and of each pair of geoms.
+    """
     heights = GroundHeights(scene)(State.of(clusters.bone_states))
     for bone in np.flatnonzero((heights < -TOLERANCE) & scene.yielding_bones).tolist():
         yield (bone, GROUND), -float(heights[bone])

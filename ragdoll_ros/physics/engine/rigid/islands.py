@@ -1,9 +1,10 @@
 """Islands: the parts of a large cluster that cannot meet within a window of time.
 
-In a cluster of many bodies few impacts are located, as each costs the whole. Where it falls into
-islands that are small enough for a while, these are advanced one by one, each with its own steps
-and impacts, from window to window (conservative synchronization). The windows follow from positions
-and velocities of the cluster alone, so that results do not depend on how work is split.
+In a cluster of many bodies few times of impact, or none, are located, as each costs a step of all
+bodies. Where the cluster falls into islands that are small enough for a while, these are advanced
+one by one, each with its own steps and impacts, from window to window (conservative
+synchronization). The windows follow from positions and velocities of the cluster alone, so that
+results do not depend on how work is split.
 """
 import numpy as np
 
@@ -19,8 +20,9 @@ MOST_HALVINGS = 6
 
 def next_window(job: np.ndarray, body_counts: np.ndarray, left: float,
                 touching: float) -> tuple[float, np.ndarray]:
-    """The longest window, ``left`` s halved some times, in which a cluster falls into islands of at
-    most MOST_BODIES, and the island (d,) of each doll; 0 and one island where there is none.
+    """The longest window, ``left`` s divided by a power of two, in which a cluster falls into
+    islands of at most MOST_BODIES, and the island (d,) of each doll. If there is none: 0 and one
+    island.
 
     ``job``: of the cluster, see Cluster.job(). ``body_counts`` (d,): bodies of each doll.
     ``touching``: see Accuracy.

@@ -47,15 +47,18 @@ def _grab(body: int, spring: Spring) -> tuple:
 
 
 def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> tuple:
-    """Its mobility is that of the bone alone about its thinnest axis, an upper bound."""
+    """The SPRING record of a joint spring. Its mobility is that of the bone alone about its
+    thinnest axis; that of the parent is left out.
+    """
     return _record(JOINT_SPRING, body, hold.stiffness, hold.damping, hold.most, axis=hold.axis,
                    angle=hold.target, velocity=(hold.rate, 0.0, 0.0), time_left=hold.left,
                    mobility=1 / min(scene.bones[hold.bone].inertia))
 
 
 def _drive(body: int, drive: AppliedDrive, scene: Scene) -> list[tuple]:
-    """Up to two springs without stiffness, at the bone's center of mass. Their mobility is the
-    bone's own, an upper bound: overestimated stiffness moves the evaluation towards the step's end.
+    """Up to two SPRING records without stiffness, at the bone's center of mass. Their mobility is
+    that of the bone alone, an upper bound: with a larger mobility damping is evaluated closer to
+    the step's end.
     """
     bone = scene.bones[drive.bone]
     mobilities = 1 / bone.mass, 1 / min(bone.inertia)

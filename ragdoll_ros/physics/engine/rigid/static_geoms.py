@@ -34,8 +34,9 @@ NO_KEYS = np.zeros(0, np.int64)
 
 
 class StaticGeoms:
-    """The g static geoms of a scene. Which of them a bone may touch is known by doll: what is near
-    one doll does not depend on others, and neither do its last digits.
+    """The g static geoms of a scene, and which of them each bone may touch. The pairs of a doll are
+    found independently of other dolls, so that the last digits of its results do not depend on
+    them.
 
     A pair of a bone and a geom has the key bone * g + geom.
     """
@@ -80,8 +81,9 @@ class StaticGeoms:
         self._keys = NO_KEYS
 
     def update(self, states: np.ndarray, duration: float, moving: np.ndarray) -> bool:
-        """See that all pairs that may touch within ``duration`` s are known, of ``moving`` dolls
-        (d,). Returns whether others are than before. ``states`` (n, 13) of all bones.
+        """Find the pairs of ``moving`` dolls (d,) that may touch within ``duration`` s. If a doll
+        has one that is not known, find its pairs anew, for LOOK_AHEAD at least. Returns whether the
+        known pairs have changed. ``states`` (n, 13) of all bones.
         """
         if not len(self.geoms):
             return False
@@ -99,7 +101,7 @@ class StaticGeoms:
         return True
 
     def keys_of(self, dolls: np.ndarray) -> np.ndarray:
-        """The known pairs (k,) of ``dolls`` (d,), indices in ascending order."""
+        """Keys (k,) of the known pairs of ``dolls``, which are indices in ascending order."""
         if not len(self._keys):
             return NO_KEYS
         begin, end = (np.searchsorted(self._keys, self._first_keys[dolls + after])
@@ -111,8 +113,9 @@ class StaticGeoms:
         return np.divmod(keys, max(1, len(self.geoms)))
 
     def pair_counts(self, moving: np.ndarray, geoms: np.ndarray) -> np.ndarray:
-        """Numbers of GEOM_PAIR records (k,) of ``moving`` geoms, their kinds and point counts, with
-        static ones: with a plane one for each point that may touch it.
+        """Numbers (k,) of GEOM_PAIR records for pairs of a moving and a static geom: one each, but
+        with a plane one for each point that may touch it. ``moving`` (k,): kinds and point counts
+        of the moving ones; ``geoms`` (k,): indices of the static ones.
         """
         kinds, static = moving['kind'], self.geoms['kind'][geoms]
         points = np.where(kinds == HULL, moving['point_count'], POINT_COUNTS[kinds])
@@ -131,11 +134,15 @@ class StaticGeoms:
         self._keys = NO_KEYS
 
     def continue_from(self, other: StaticGeoms, change: SceneChange, known: np.ndarray) -> None:
-        """Take the pairs of the ``known`` dolls (d,) of the scene before, which stay."""
+        """Take from ``other`` the pairs of those dolls for which ``known`` (d,) is true; all of
+        these stay.
+        """
         self._keys = self.moved_keys(other._keys[known[other._dolls_of(other._keys)]], change)
 
     def moved_keys(self, keys: np.ndarray, change: SceneChange) -> np.ndarray:
-        """Pairs (k,) of the scene before, of bones that stay, in the scene after."""
+        """Keys (k,) in the scene after a change of ``keys`` of the scene before, all of bones that
+        stay.
+        """
         if not len(keys):
             return NO_KEYS
         bones, geoms = self.bones_and_geoms(keys)

@@ -1,8 +1,8 @@
-"""BulletEngine: the engine protocol on PyBullet; no other file imports that library.
+"""BulletEngine: the engine protocol on PyBullet; no other engine imports that library.
 
 Dolls are Featherstone multibodies read from URDF with explicit inertia. Universal joints are two
-hinges with a massless link between. Joint motors, link damping and velocity clamps, which PyBullet
-enables by default, are disabled.
+hinges with a massless link between. Joint motors and link damping, which PyBullet enables by
+default, are disabled; its velocity clamp is raised to LARGEST_RATE.
 """
 import math
 import os
@@ -102,7 +102,9 @@ class _World:
         yield self._add_plane(ground.normal, (x, y, z), None)
 
     def _add_bodies(self) -> Iterator[tuple[int, int]]:
-        """Add each part of the static bodies as a body of its own; these, and the scene's."""
+        """Add each part of the static bodies as a body of its own; yield its index, and that of the
+        scene's body.
+        """
         for index, one in enumerate(self.scene.bodies):
             if isinstance(one.shape, Plane):
                 yield self._add_plane(one.normal, one.position, one), index
@@ -138,7 +140,9 @@ class _World:
         return self._set_up(doll, body)
 
     def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
-        """Map links and joints by name; disable motors, damping and clamps."""
+        """Map links and joints by name; disable motors and link damping, raise the
+        velocity clamp.
+        """
         links, joints, widths = {doll.root.name: -1}, [], []
         damping = {name: joint.damping for joint in doll.joints
                    for name in (joint.child, *joint.angle_names)}

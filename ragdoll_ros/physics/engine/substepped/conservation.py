@@ -1,7 +1,8 @@
 """Projection of PyBullet's steps onto conservation of energy, momentum and angular momentum.
 
-Discrete steps violate all three. The projection compares each doll with its energy account and
-with the impulses of the loads, and corrects velocities by the smallest change that restores them.
+Discrete steps violate all three. The projection compares each doll with its energy account and with
+the impulses of the loads, and corrects velocities, and in the air also positions, by the smallest
+change that restores them.
 """
 import math
 
@@ -32,12 +33,12 @@ class ConservationProjection:
 
     def with_momentum(self, coordinates: GeneralizedState, states: tuple[State, State],
                       duration: float, wrenches: Wrenches, touched: np.ndarray) -> GeneralizedState:
-        """Restore the momenta of dolls without contacts; ``touched`` (d,) bool.
+        """Restore momenta and centre of mass of dolls without contacts; ``touched`` (d,) bool.
 
         ``states``: before and after ``duration`` s under ``wrenches``. The missing momentum is
         added as a rigid motion of the locked doll with angular velocity Ic^-1 dL, which leaves
-        joint rates unchanged. Under forces the angular momentum is not corrected, as their moments
-        are not known accurately enough.
+        joint rates unchanged. If any load is a force, no angular momentum is corrected, as the
+        moments of forces are not known accurately enough.
         """
         first, last = (self._sums.totals(state) for state in states)
         masses = self._sums.doll_masses[:, None]

@@ -109,7 +109,9 @@ class SubsteppedEngine(ABC):
         self._account.add_work(doll, self.doll_totals.energy.sum() - before, by_hand=False)
 
     def set_kinematic(self, doll: int, kinematic: bool) -> None:
-        """Nothing: within a tick an animated doll yields to what it meets."""
+        """Disable collision of overlapping bones when an animation ends; nothing else, as within a
+        tick an animated doll yields to what it meets.
+        """
         if not kinematic:
             self._exclude_overlaps()
 
@@ -146,7 +148,9 @@ class SubsteppedEngine(ABC):
         self._invalidate()
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
-        """Set all velocities to zero; the energy account is lowered by what is lost."""
+        """Put all dolls to sleep: set all velocities to zero and lower the allowed energies to what
+        is left.
+        """
         self.sleeping[:] = True
         here = self.coordinates
         self._set_state(GeneralizedState(here.q, np.zeros_like(here.v)))
@@ -154,7 +158,9 @@ class SubsteppedEngine(ABC):
         self._taken = 0
 
     def dolls_on_ground(self) -> np.ndarray:
-        """Whether any doll touches the ground, (d,): the dolls are one cluster."""
+        """Whether any doll touches the ground or a static body, the same for all (d,): they are one
+        cluster.
+        """
         return np.full(len(self.sleeping), any(GROUND in pair for pair in self._touching_pairs()))
 
     def bones_on_ground(self) -> np.ndarray:
@@ -233,7 +239,9 @@ class SubsteppedEngine(ABC):
         raise NotImplementedError
 
     def _lift_out_of_ground(self, dolls: Sequence[int]) -> None:
-        """Raise those ``dolls`` that penetrate the ground: else they stay there or are thrown."""
+        """Raise those ``dolls`` that are deeper in the ground than allowed_penetration(): else they
+        stay there or are thrown.
+        """
         heights = self._heights(self.state)
         depths = -np.array([heights[own].min() for own in self.scene.bone_slices])
         sunk = (depths > allowed_penetration(self.scene)) & np.isin(np.arange(len(depths)), dolls)
@@ -290,7 +298,7 @@ class SubsteppedEngine(ABC):
 
 
 def _warn_of_friction(scene: Scene) -> None:
-    """Warn where finite_friction() replaces a coefficient of the scene."""
+    """Warn where finite_friction() replaces a coefficient of the ground or of a bone."""
     most = max(scene.material.on(bone)[0] for bone in (None, *scene.bones))
     if most > LARGEST_FRICTION:
         text = (f'unlimited friction is a coefficient of {NO_SLIP:g}' if math.isinf(most) else

@@ -176,7 +176,9 @@ class MujocoEngine(SubsteppedEngine):
         self._stale = True
 
     def _ball(self, placement: Placement, joint: Joint) -> tuple[int, int, np.ndarray]:
-        """Addresses in q and v of a free ball joint, and its child's orientation at rest."""
+        """Addresses in q and v of a free ball joint, and its child's orientation at rest in the
+        joint's frame.
+        """
         child = placement.doll.bone(joint.child)
         seat = rotation.multiply(rotation.inverse(joint_frame(joint)), child.orientation)
         return *self._address(placement, joint.child), seat
@@ -223,7 +225,9 @@ class MujocoEngine(SubsteppedEngine):
 
 
 def silence_warnings() -> None:
-    """Discard MuJoCo's warnings about diverging runs, if MuJoCo is installed."""
+    """Discard all warnings of MuJoCo, such as those about diverging runs, if MuJoCo is
+    installed.
+    """
     with contextlib.suppress(ImportError):
         import mujoco
         mujoco.set_mju_user_warning(lambda message: None)

@@ -51,8 +51,8 @@ class WorldPose(NamedTuple):
     stamp: int
 
     def twist_since(self, last: WorldPose | None) -> np.ndarray:
-        """Mean twist (6,) since the ``last`` pose, m/s and rad/s; zero if that is too long ago, or
-        not before this one.
+        """Mean twist (6,) since the ``last`` pose, m/s and rad/s. Zero without a last pose, or if
+        that is not older or more than LONGEST older.
         """
         seconds = 0.0 if last is None else (self.stamp - last.stamp) / SECOND
         if last is None or not 0 < seconds <= LONGEST:
@@ -66,8 +66,8 @@ class FrameFollower:
     """Composes the transforms of frames, and moves the bodies that follow these.
 
     A frame's pose is composed of the latest transform of each frame up to the world frame; nothing
-    is interpolated. Its stamp is the latest of them. ``refuse(topic, error)`` is told what is
-    wrong.
+    is interpolated. Its stamp is the latest stamp of these transforms. ``refuse(topic, error)`` is
+    called for each wrong transform or frame.
     """
 
     def __init__(self, drive: Drive, refuse: Refuse) -> None:
@@ -88,7 +88,9 @@ class FrameFollower:
             self._unconnected.clear()
 
     def on_transforms(self, topic: str, transforms: Iterable[TransformStamped]) -> None:
-        """Take transforms; of those that are wrong, each is refused."""
+        """Take transforms and move the bodies that follow them. Each wrong transform is refused;
+        the others are taken.
+        """
         changed = set()
         for each in transforms:
             try:
@@ -105,7 +107,7 @@ class FrameFollower:
                     self._refuse(topic, error.at(frame))
 
     def _chain(self, frame: str) -> list[str]:
-        """The frame and those above it, as far as they are known, without the world frame."""
+        """List the known frames from ``frame`` upwards, without the world frame."""
         chain: list[str] = []
         while frame in self._transforms and frame != self.world and frame not in chain:
             chain.append(frame)
@@ -165,7 +167,7 @@ class BodyFrames:
 
 
 def _transform(message: TransformStamped) -> Transform:
-    """Raises NotFinite, NotUnit."""
+    """Convert a message. Raises NotFinite, or NotUnit for a zero quaternion."""
     move, turn, stamp = (message.transform.translation, message.transform.rotation,
                          message.header.stamp)
     position = (move.x, move.y, move.z)

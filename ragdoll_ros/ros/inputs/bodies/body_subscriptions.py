@@ -33,15 +33,15 @@ JOINTS = 'joint_states'
 
 
 class BodySubscriptions:
-    """Subscriptions to ~/bodies/<name>/odom and ~/bodies/<name>/cmd_vel, for each driven body and
-    robot, to ~/bodies/<name>/joint_states, for each robot and each doll with motors on a fixed
-    root, and to /tf, where bodies follow frames.
+    """Subscriptions to ~/bodies/<name>/odom and ~/bodies/<name>/cmd_vel for each driven body and
+    robot; to ~/bodies/<name>/joint_states for each robot and each doll with motors on a fixed root;
+    and to /tf where bodies follow frames.
 
     A pose is that of the body's frame in the world frame, whatever the message calls its frames: a
-    robot's odometry has names of its own. Twists are along the body's axes, as nav_msgs and REP 103
-    have them. Those of a robot are its root link's. What a message with a stamp says is carried on
-    to the present, see message_times.py. ``after`` is called when a body has been told how to move;
-    ``now()`` is the stamp of the present state, ns.
+    robot's odometry has frame names of its own. Twists are along the body's axes, as nav_msgs and
+    REP 103 define them. Pose and twist of a robot are those of its root link. Values of a message
+    with a stamp are extrapolated to the present, see message_times.py. ``after`` is called when a
+    body has been told how to move; ``now()`` is the stamp of the present state, ns.
     """
 
     def __init__(self, node: Node, counts: InputCounts, after: Callable[[], None],
@@ -101,7 +101,9 @@ class BodySubscriptions:
         self._frames.configure(settings.body_frames, self.simulation.scene, settings.frame_id)
 
     def on_odometry(self, name: str, message: Odometry) -> None:
-        """Move a body on from a pose; a message that is wrong is refused and counted."""
+        """Drive a body from the pose of the message, with its twist; a message that is wrong is
+        refused and counted.
+        """
         pose, source = message.pose.pose, f'{body_topic(name)}/odom'
         q, p = pose.orientation, pose.position
         with self._counts.refusing(source):
@@ -111,14 +113,17 @@ class BodySubscriptions:
                         message.twist.twist, self._times.lead(from_time(message.header.stamp)))
 
     def on_cmd_vel(self, name: str, message: Twist) -> None:
-        """Move a body on from where it is; a message that is wrong is refused and counted."""
+        """Drive a body from its present pose, with the twist of the message; a message that is
+        wrong is refused and counted.
+        """
         source = f'{body_topic(name)}/cmd_vel'
         with self._counts.refusing(source):
             self._drive(source, name, None, self.simulation.body_pose(name)[3:], message, 0.0)
 
     def on_joint_states(self, name: str, message: JointState) -> None:
-        """Move joints of a robot on; a message that is wrong is refused and counted. Names that are
-        not the robot's are left out, if others are: of a gripper, or a second arm.
+        """Set angles and rates of a robot's joints, or targets of a doll's motors; a message that
+        is wrong is refused and counted. If at least one name is the robot's, other names, as of a
+        gripper or a second arm, are left out and logged.
         """
         with self._counts.refusing(f'{body_topic(name)}/{JOINTS}'):
             angles, rates = joint_values(message)
@@ -140,8 +145,8 @@ class BodySubscriptions:
 
     def _aim(self, name: str, angles: dict[str, float], rates: dict[str, float],
              known: dict[str, bool]) -> None:
-        """Set targets of a doll's motors; a joint that turns without end goes the shorter way.
-        Raises UnknownJoint: none of these is the doll's.
+        """Set targets of a doll's motors; a joint without limits turns the shorter way. ``known``:
+        see turning_joints(). Raises UnknownJoint if none of the names is the doll's.
         """
         named = {**angles, **rates}
         if named and not named.keys() & known.keys():
@@ -174,8 +179,8 @@ class BodySubscriptions:
 
     def _drive(self, source: str, name: str, pose: Sequence[float] | None,
                orientation: Sequence[float], twist: Twist, lead: float) -> None:
-        """Move a body; ``orientation``: of the axes that the twist is along; ``lead``: s since the
-        pose.
+        """Move a body. ``pose``: (7,), None: from where it is; ``orientation``: of the axes along
+        which the twist is given; ``lead``: time since the pose, s.
         """
         parts = [rotation.rotate(orientation, limited(
             self._counts, source, f'twist.{key}', getattr(twist, key), MAX_SPEED, 'the limit'))
@@ -186,7 +191,7 @@ class BodySubscriptions:
 
 
 def turning_joints(scene: Scene, name: str) -> dict[str, bool]:
-    """Names of the joints of a robot, or of a doll, and whether each turns without end."""
+    """Return whether each joint of a robot, or angle of a doll, turns without limits, by name."""
     found = {joint.name: joint.kind == 'continuous' for robot in scene.robots if robot.name == name
              for joint in robot.joints if joint.kind != 'fixed'}
     return found | {angle: limits is None for placement in scene.dolls if placement.name == name
@@ -195,5 +200,7 @@ def turning_joints(scene: Scene, name: str) -> dict[str, bool]:
 
 
 def body_topic(name: str) -> str:
-    """Where a body's topics are: its name with what no topic may have as _."""
+    """Return the prefix of a body's topics: its name with _ for each character that no topic may
+    have, and before a leading digit.
+    """
     return '~/bodies/' + re.sub(r'^(?=\d)', '_', re.sub(r'\W', '_', name, flags=re.ASCII))

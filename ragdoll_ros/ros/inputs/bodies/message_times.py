@@ -1,8 +1,9 @@
-"""When a message's values are of: by its stamp, whatever its delay.
+"""Times of messages: their values apply at their stamps, whatever the delay.
 
-A body reaches what it was told in one tick. If messages arrive now just before a tick and now just
-after it, a joint would turn at nothing for a tick and at twice its rate in the next, and hit so.
-What a message says is therefore carried on, at its rates, from its stamp to the present state's.
+A body reaches what it was told within one tick. If one message arrives just before a tick and the
+next just after one, a joint would stand still for a tick, turn at twice its rate in the next, and
+hit with that speed. Values are therefore extrapolated, at their rates, from the stamp of the
+message to that of the present state.
 """
 from __future__ import annotations
 
@@ -29,16 +30,17 @@ class MessageTimes:
         """Stamp, ns, and angles of the last message of joints, by source."""
 
     def lead(self, stamp: int) -> float:
-        """Time, s, from a stamp, ns, to the present state; 0 if there is no stamp, or one that is
-        more than LONGEST away, as of another clock.
+        """Return the time, s, from a stamp, ns, to the present state. 0 if there is no stamp, or if
+        it is more than LONGEST away, as that of another clock.
         """
         lead = (self._now() - stamp) / SECOND
         return lead if stamp and abs(lead) <= LONGEST else 0.0
 
     def rates(self, source: str, stamp: int, angles: Mapping[str, float],
               wraps: Mapping[str, bool]) -> dict[str, float]:
-        """Rates of the angles since the last message of a source, by their stamps, ns; none without
-        one, or after more than LONGEST. ``wraps``: joints whose angles may.
+        """Return rates of the angles since the last message of a source, by their stamps, ns. Empty
+        without a last message or its stamp, or unless this message is later by at most LONGEST.
+        ``wraps``: whether a joint turns without limits, so that its angle may wrap.
         """
         before, last = self._last.get(source, (0, {}))
         self._last[source] = stamp, dict(angles)
@@ -56,7 +58,7 @@ def _difference(angle: float, before: float, wraps: bool) -> float:
 
 
 def carried_on(pose: Sequence[float], twist: Sequence[float], seconds: float) -> list[float]:
-    """Pose (7,) that moves by a twist (6,), world frame, for some seconds."""
+    """Advance a pose (7,) by a twist (6,), both in the world frame, for ``seconds``."""
     if not seconds:
         return list(pose)
     turn = rotation.from_rotation_vector(seconds * np.asarray(twist[3:]))

@@ -40,9 +40,9 @@ class Found(NamedTuple):
 
 
 def doll_of(uri: str, text: str) -> Found:
-    """The doll of a resource: of a scene of one doll or a doll, a URDF, an SDF of one robot, or a
-    character. A scene's ground and bodies are left out. Raises Refusal; says nothing of a file that
-    is none of these.
+    """Read the doll of a resource: a doll, a scene of one doll, a URDF, an SDF of one robot, or a
+    character. A scene's ground and bodies are left out. Raises Refusal, which tells nothing of the
+    content of a file that is none of these.
     """
     try:
         found = _of_file(uri) if uri else _of_text(text)
@@ -70,8 +70,8 @@ def _of_file(uri: str) -> list[Found]:
 
 @functools.lru_cache(MOST_KEPT)
 def _shipped(path: str, _: int) -> tuple[Placement, ...]:
-    """The dolls of a file in config/ that was changed at this time, read once: reading takes the
-    interpreter from the ticks for longer than spawning does.
+    """Return the dolls of a file in config/, read once for each time of its last change, the second
+    argument: reading takes the interpreter from the ticks for longer than spawning does.
     """
     return load_scene(path).dolls
 
@@ -114,7 +114,9 @@ def _robots_of_sdf(path: Path) -> list[Found]:
 
 
 def _check_root(path: Path, tag: str, name: str) -> None:
-    """Raise Refusal for a file without ``tag``, of which nothing else is to be told."""
+    """Raise Refusal for a file without ``tag``, so that nothing else of its content is told.
+    ``name``: of the format.
+    """
     if f'<{tag}' not in path.read_text(encoding='utf-8', errors='replace'):
         raise Refusal(RESOURCE_PARSE_ERROR, f'{path}: a file without <{tag}; expected {name}')
 

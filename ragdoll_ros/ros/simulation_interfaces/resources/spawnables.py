@@ -41,8 +41,8 @@ def shipped() -> tuple[Spawnable, ...]:
 
 
 def spawnables(sources: Iterable[str]) -> tuple[list[Spawnable], str]:
-    """The dolls in config/, the robots and characters in ``sources``, which are folders, and a
-    sentence on those that are none.
+    """Return the dolls in config/, the robots and characters in ``sources``, which are folders, and
+    a sentence on sources that are no folders, or an empty text.
     """
     found, unknown = list(shipped()), []
     for source in sources:

@@ -1,4 +1,4 @@
-"""Loads worlds in a thread, one at a time, while all is served; a load can be cancelled."""
+"""Loads worlds in a thread, one at a time, while the node runs; a load can be cancelled."""
 from __future__ import annotations
 
 import sys
@@ -25,7 +25,9 @@ class Loaded(Protocol):
 
 
 class Load:
-    """A world that is being loaded; ``ended`` is done when that is over, or is not waited for."""
+    """A world that is being loaded; the future ``ended`` is done when it is loaded, has failed or
+    is cancelled.
+    """
 
     def __init__(self, make: Callable[[], Loaded], before: threading.Thread | None) -> None:
         self.cancelled = ''
@@ -38,7 +40,9 @@ class Load:
         self.thread = threading.Thread(target=self._run, name='load world', daemon=True)
 
     def _run(self) -> None:
-        """What a cancelled load had begun is ended before, so that they do not pile up."""
+        """Make the world, unless cancelled. The thread of the load before ends first, so that
+        cancelled loads do not pile up.
+        """
         if self._before is not None:
             self._before.join()
             self._before = None
@@ -55,7 +59,7 @@ class Load:
                 found.simulation.close()
 
     def cancel(self, reason: str) -> None:
-        """Wait for it no longer; what it makes is discarded."""
+        """End the wait for the world; the simulation that is made is closed."""
         with self._lock:
             self.cancelled = reason
             if self._found:
@@ -117,7 +121,7 @@ class WorldLoader:
             self._load.ended.set_result(None)
 
     def _end(self) -> Load | None:
-        """The load that was under way, which is no more."""
+        """End the load that is under way and return it; None if there is none."""
         load, self._load = self._load, None
         if load is not None:
             self._timer.cancel()

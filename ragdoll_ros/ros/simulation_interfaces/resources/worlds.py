@@ -45,9 +45,9 @@ def available(sources: Sequence[str], continue_on_error: bool) -> tuple[list[Wor
 
 def scene_of(uri: str, text: str, unsupported: int = UNSUPPORTED_FORMAT,
              formats: tuple[str, ...] = FORMATS) -> str:
-    """Value of the parameter `scene` for a resource, or the name or path of another file. Raises
-    Refusal, with the code ``unsupported`` for a file of none of the ``formats``; says nothing of a
-    file.
+    """Return the value of the parameter `scene` for a resource, or the name or path of another
+    file. Raises Refusal, with the code ``unsupported`` for a file of none of the ``formats``; it
+    tells nothing of a file's content.
     """
     if not uri:
         raise (Refusal(Code.FEATURE_UNSUPPORTED, 'resource_string: expected a uri') if text else
