@@ -12,7 +12,7 @@ from ragdoll_ros.falls.dataset_summary import summarize
 from ragdoll_ros.falls.fall import fall_samples
 from ragdoll_ros.falls.manifest import build_dataset
 from ragdoll_ros.falls.peaks import Peaks
-from ragdoll_ros.falls.pictures import hull
+from ragdoll_ros.falls.pictures import _outlines, hull
 from ragdoll_ros.falls.shard import DatasetJob, make_shard
 from ragdoll_ros.people.real_falls import bones_of
 
@@ -87,6 +87,17 @@ def test_outlines_are_convex_hulls():
     reference = spatial.ConvexHull(points)
     np.testing.assert_allclose(np.sort(hull(points), axis=0),
                                np.sort(points[reference.vertices], axis=0))
+
+
+def test_what_is_nearer_to_the_viewer_is_drawn_over_what_is_behind():
+    start = {'lean_deg': 30, 'lean_towards_deg': 90}
+    fall = next(generate(recipe(SHOVE, start=start, pushes=[], duration=0.1), [0]))
+    # With forwards, x, to the right and up upwards, the viewer is at the doll's right side, at -y.
+    behind = fall.states[0, np.argsort(fall.states[0, :, 1]), 2]
+    heights = [(outline[:, 1].min() + outline[:, 1].max()) / 2
+               for outline in _outlines(fall, 0, np.array((1.0, 0.0, 0.0)))]
+    assert abs(behind[0] - behind[-1]) > 0.1
+    np.testing.assert_allclose(heights, behind[::-1], atol=0.02)
 
 
 def test_bones_that_stand_for_parts():

@@ -102,11 +102,12 @@ def test_level_soles_set_the_ankles_of_people():
     assert [error.path for error in found] == ['start.angles_deg.l_p_ankle']
 
 
-def test_friction_may_be_less_under_one_bone():
+@pytest.mark.parametrize('friction', [0.9, math.inf])
+def test_friction_may_be_less_under_one_bone(friction):
     box = {'name': 'box', 'bones': [{'name': 'box', 'mass': 2.0, 'position': [0, 0, 0.05],
                                      'shape': {'box': {'size': [0.4, 0.4, 0.1]}}}]}
     fall = next(generate(recipe(who={'dolls': [box]}, start={'lean_deg': 30}, ground={
-        'friction': 0.9, 'friction_under': {'box': 0.2}, 'slope_deg': 30}), [0]))
+        'friction': friction, 'friction_under': {'box': 0.2}, 'slope_deg': 30}), [0]))
     slope = math.radians(30)
     speed = 9.8 * (math.sin(slope) - 0.2 * math.cos(slope)) * fall.times[-1]
     assert np.linalg.norm(fall.states[-1, 0, 7:10]) == pytest.approx(speed, rel=1e-3)

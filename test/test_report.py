@@ -21,7 +21,7 @@ from ragdoll_ros.accuracy.methods import bullet, by_name, median_run, ours, quic
 from ragdoll_ros.accuracy.metrics import Metrics
 from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight, tumbling_box
 from ragdoll_ros.accuracy.motions.mechanisms import OMEGA, swing
-from ragdoll_ros.accuracy.parts import orders, start_classes
+from ragdoll_ros.accuracy.parts import orders, start_classes, work_precision
 from ragdoll_ros.accuracy.parts.hard import violations
 from ragdoll_ros.accuracy.references.articulated import Articulated, torque_free_rotation
 from ragdoll_ros.accuracy.report import command, hard, many_starts, plots
@@ -31,6 +31,7 @@ from ragdoll_ros.accuracy.results import markdown as tables
 from ragdoll_ros.accuracy.results.runner import Job, attempt
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.model import rotation
+from ragdoll_ros.physics.simulation import Simulation
 
 
 def test_the_slope_of_a_power_is_its_order():
@@ -65,6 +66,22 @@ def test_the_quickstart_brakes():
     result = run(quickstart(), motion.trial)
     assert len(result.trajectory.times) == 241
     assert np.abs(result.trajectory.linear_velocities[-1, 0, 2]) < .95 * 9.8
+
+
+@pytest.mark.parametrize('name', ['projectile', 'tumbling_box', 'thin_disc', 'three_balls',
+                                  'chain_2', 'rolling_ball'])
+@pytest.mark.parametrize('method', ['quickstart', 'bullet-1', 'mujoco-euler-1', 'ours-normal',
+                                    'dart-1', 'drake-4'])
+def test_every_method_begins_where_the_trial_does(method, name):
+    if methods.missing_peers([method]):
+        pytest.skip(f'{method} is not installed')
+    trial = work_precision.motions()[name].trial
+    found = run(by_name(method), dataclasses.replace(trial, duration=trial.scene.step)).trajectory
+    with Simulation(trial.scene) as simulation:
+        state = simulation.place(trial.start) if trial.start is not None else simulation.state
+    # MuJoCo's quaternions are normalized, which rounds.
+    for key in ('positions', 'linear_velocities', 'angular_velocities'):
+        np.testing.assert_allclose(getattr(found, key)[0], getattr(state, key), atol=1e-9)
 
 
 def test_a_pendulum_hangs_still_at_its_root():

@@ -63,6 +63,11 @@ def stamp(message):
     return message.header.stamp.sec * SECOND + message.header.stamp.nanosec
 
 
+def spacings(messages):
+    """Time between the stamps of poses that follow on each other, ns."""
+    return np.diff([stamp(message) for _, message in messages])
+
+
 def poses_array(message):
     return np.array([[p.position.x, p.position.y, p.position.z, p.orientation.x, p.orientation.y,
                       p.orientation.z, p.orientation.w] for p in message.poses])
@@ -95,9 +100,9 @@ def test_poses_come_at_the_rate_times_the_pace(heard, peer):
 
 def test_poses_come_with_exact_stamps(heard, peer):
     got = next_poses(heard, peer, 300)
-    # A busy machine may have dropped ticks; all others are equally spaced.
-    steps = np.diff([stamp(message) for _, message in got])
-    assert (steps >= SPACING).all() and np.mean(steps == SPACING) > 0.95
+    assert (spacings(got) >= SPACING).all()
+    # A busy machine drops ticks; where it does not, for half a second, they are equally spaced.
+    peer.wait(lambda: (spacings(heard['poses'][-101:]) == SPACING).all())
     poses = np.array([poses_array(message) for _, message in got])
     assert poses.shape == (300, 10, 7)
     np.testing.assert_allclose(np.linalg.norm(poses[:, :, 3:], axis=2), 1, atol=1e-12)

@@ -41,7 +41,7 @@ EXAMPLE = """examples:
 
 @dataclasses.dataclass(frozen=True)
 class Ledger:
-    """What ``ticks`` ticks of a scene took: counts, and s of all in ``seconds``."""
+    """Counts of ``ticks`` ticks of a scene, and their wall time, ``seconds``."""
 
     ticks: int
     seconds: float
@@ -59,7 +59,7 @@ class Ledger:
 
 
 def measure(source: str, accuracy: str, seconds: float) -> Ledger:
-    """Simulate a scene for so many s from its start, awake, on one thread."""
+    """Simulate ``seconds`` s of a scene from its start, without sleep, on one thread."""
     from ..physics.kernels.compiling.cycle_rate import cycle_rate
     awake = dataclasses.replace(ACCURACIES[accuracy], sleep=False)
     with Simulation(load_scene(source), engine='rigid', accuracy=awake) as simulation:

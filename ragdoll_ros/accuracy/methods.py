@@ -43,7 +43,7 @@ OPTIONAL = {'dart': 'dartpy', 'drake': 'pydrake'}
 
 
 class MethodRun(Protocol):
-    """A running trial; implemented by Simulation."""
+    """A running trial; implemented by Simulation and by the classes of peers/."""
 
     @property
     def state(self) -> State:
@@ -58,7 +58,9 @@ class MethodRun(Protocol):
 
 @dataclass(frozen=True)
 class Method:
-    """An engine with settings; ``family`` is its line in plots, ``substeps`` 0 if adaptive."""
+    """An engine with settings. Methods of a ``family`` share a line in plots; ``substeps`` is 0 for
+    ours and for core.
+    """
 
     name: str
     label: str
@@ -105,12 +107,14 @@ def has_rigid_engine() -> bool:
 
 
 def contact_step(setting: str = 'normal') -> float:
-    """Largest step, s, of the rigid engine at a setting while in contact."""
+    """Nominal step, s, of the rigid engine in contact, at a setting."""
     return ACCURACIES[setting].step
 
 
 def fixed_steps(step: float) -> Accuracy:
-    """Accuracy with steps of ``step`` s, without energy correction and sleep, which hide errors."""
+    """Accuracy with contact steps of nominally ``step`` s, without energy correction and sleep,
+    which hide errors.
+    """
     return dataclasses.replace(NORMAL, step=step, substeps=TICK / step, energy=False, sleep=False,
                                flight_error=MIN_FLIGHT_ERROR)
 
@@ -161,7 +165,7 @@ def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
 
 
 def core(step: float) -> Method:
-    """The rigid engine with fixed steps of ``step`` s."""
+    """The rigid engine with contact steps of nominally ``step`` s."""
     return Method(f'core-{step:g}', f'core, steps of {step * 1e6:g} µs', 'core', functools.partial(
         start_simulation, accuracy=fixed_steps(step), engine=RIGID))
 
@@ -214,7 +218,7 @@ def installed(names: Iterable[str]) -> list[str]:
 
 
 def missing_peers(names: Iterable[str] = OPTIONAL) -> list[str]:
-    """Modules of optional peers that are named, or begin a method's name, and not installed."""
+    """Modules of optional peers that are not installed, of the peers or methods in ``names``."""
     families = {name.partition('-')[0] for name in names}
     return [module for family, module in OPTIONAL.items()
             if family in families and importlib.util.find_spec(module) is None]

@@ -43,7 +43,9 @@ class Metrics:
                 + np.einsum('nd,tnd,tnd->t', self._inertias, body, body)) / 2
 
     def energy(self, trajectory: Trajectory) -> np.ndarray:
-        """Kinetic and potential energy (t,) J; zero height is the ground, or z = 0."""
+        """Kinetic and potential energy (t,) J. Zero is the height of the ground's point nearest to
+        the origin, or of the origin.
+        """
         zero = np.zeros(3)
         if self.scene.ground is not None:
             zero = np.array(self.scene.ground.normal) * self.scene.ground.offset
@@ -70,8 +72,8 @@ class Metrics:
         """Cumulative work (t,) J of the pushes.
 
         Force times displacement is exact, as the force is constant within a tick. The integral of
-        the angular velocity w is the tick's rotation vector plus t^2 / 12 w_start x w_end (Magnus
-        series).
+        the angular velocity w over a tick of h s is the rotation vector plus h^2 / 12 w_start x
+        w_end (Magnus series).
         """
         work = np.zeros(len(trajectory.times))
         for push in trial.pushes:
@@ -91,9 +93,11 @@ class Metrics:
         return work
 
     def energy_excess(self, trial: Trial, trajectory: Trajectory, released: float = 0.0) -> float:
-        """Energy gain: the largest rise of E - W above its running minimum, over max(E0 + W).
+        """Energy gain: the largest rise of E - W above its running minimum, less ``released``, over
+        the running maximum of E0 + ``released`` + W.
 
-        ``released``, J, is energy that the start itself may release. NaN if max(E0 + W) <= 0.
+        ``released``, J, is energy that the start itself may release. NaN if that maximum never is >
+        0; infinity if a share is not finite.
         """
         energy, work = self.energy(trajectory), self.work(trial, trajectory)
         own = np.maximum.accumulate(energy[0] + released + work)
@@ -117,7 +121,9 @@ class Metrics:
         return _share(np.abs(momentum - momentum[0] - expected).max(), scale)
 
     def angular_momentum_drift(self, trajectory: Trajectory) -> float:
-        """Largest change of angular momentum about the centre of mass, over the sum of |L|."""
+        """Largest change of angular momentum about the centre of mass, over the largest sum of |L|
+        of the bones' orbital and spin parts.
+        """
         total = self.angular_momentum(trajectory)
         scale = sum(np.linalg.norm(part, axis=-1)
                     for part in self._angular_momenta(trajectory)).sum(axis=1).max()
@@ -158,7 +164,9 @@ class Metrics:
         return np.maximum(angles - upper, lower - angles).max(axis=1).clip(min=0.0)
 
     def after_limit_recovery(self, trajectory: Trajectory) -> Trajectory:
-        """The part after all joints that start past their limits have recovered; all, if never."""
+        """The part from the first instant at which no joint is past its limit by more than
+        RECOVERED; all, if there is none.
+        """
         past = self.overshoots(trajectory)
         inside = past <= RECOVERED
         back = int(np.argmax(inside)) if not inside[0] and inside.any() else 0

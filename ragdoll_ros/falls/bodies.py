@@ -14,7 +14,8 @@ from ..model.static_body import StaticBody
 
 
 def read_bodies(data: dict, folder: Path) -> tuple[tuple[StaticBody, ...], list[ModelError]]:
-    """The bodies of a recipe's data, and every error of them and of ``floor``.
+    """Read the bodies of a recipe's data. Returns them and all their errors or, if they have none,
+    the error of the first unknown name in ``floor``.
 
     Paths are relative to ``folder``.
     """
@@ -33,7 +34,9 @@ def read_bodies(data: dict, folder: Path) -> tuple[tuple[StaticBody, ...], list[
 
 
 def floor_names(bodies: tuple[StaticBody, ...], names: list[str]) -> list[str]:
-    """Names of the bodies that ``names`` means: also the copies of one that is repeated."""
+    """Names of the bodies that ``names`` select: each body whose name is in ``names`` or begins
+    with one of them and "_", as the names of the copies of a repeated body do.
+    """
     return [body.name for body in bodies
             if any(body.name == name or body.name.startswith(f'{name}_') for name in names)]
 

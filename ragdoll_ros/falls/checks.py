@@ -33,7 +33,9 @@ RANGES = {
 
 
 def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> list[ModelError]:
-    """Errors of the data beside those ``found`` so far; ``dolls`` are those it names."""
+    """Further errors of the data, besides those already ``found``; ``dolls`` are the recipe's.
+    Names are checked only if no part of the data that holds them has another error.
+    """
     more = [error for key, part in data.items() if not has_error_under(found, key)
             for error in distribution_errors(part, key)]
     for check in (_out_of_range, _wrong_people, _wrong_limp, _wrong_walk, _wrong_rate, _wrong_imus):
@@ -98,14 +100,14 @@ def _wrong_people(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _wrong_limp(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """`limp` of dolls: only people can be held upright."""
+    """`limp` in a recipe of dolls: only people can be held upright."""
     who = data.get('who')
     if data.get('limp') and isinstance(who, dict) and 'people' not in who:
         yield errors.WrongForm('limp', 'dolls', 'people: only they can be held upright')
 
 
 def _wrong_walk(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """`walk` or `level_soles` of dolls, or beside what they determine."""
+    """`walk` or `level_soles` in a recipe of dolls, or together with keys that they determine."""
     start, who = data.get('start'), data.get('who')
     if has_error_under(found, 'start') or not isinstance(start, dict):
         return
@@ -127,7 +129,7 @@ def _wrong_walk(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """A sensor rate that is no multiple of the frame rate."""
+    """A sensor rate that is not the frame rate times an integer from 1 to MAX_SAMPLES_PER_TICK."""
     record = data.get('record')
     if not has_error_under(found, 'record') and isinstance(record, dict) and 'imu_rate' in record:
         rate, fast = record.get('rate', RATE), record['imu_rate']

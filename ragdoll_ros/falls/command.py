@@ -27,7 +27,9 @@ EXAMPLE = """examples:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Exit code of the command: 1 after an error in the run, 2 for a wrong call, 130 for Ctrl-C."""
+    """Run the command and return its exit code: 0, 1 after an error in the run, 2 for a wrong call
+    or any error of `describe`, 130 for Ctrl-C while falls are made.
+    """
     arguments = sys.argv[1:] if arguments is None else arguments
     if arguments[:1] == ['describe']:
         try:
@@ -125,7 +127,7 @@ class ProgressLine:
         self._terminal = sys.stderr.isatty()
 
     def update(self, manifest: Manifest, new: int) -> None:
-        """Count ``new`` more falls and print."""
+        """Count ``new`` more falls and print; without a terminal, at most every LOG_INTERVAL."""
         self._new += new
         now = time.monotonic()
         if self._terminal:

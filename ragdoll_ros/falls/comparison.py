@@ -37,13 +37,13 @@ class PublishedComparison:
 
     @property
     def warning(self) -> str:
-        """The same in a line."""
+        """The comparison as one line of text."""
         return f'{self.what}: {self.ours}; real falls: {self.published} ({self.source})'
 
 
 def comparisons(summary: DatasetSummary) -> Iterator[PublishedComparison]:
-    """All that can be compared; nothing for body parts that the doll lacks, or where nobody is
-    meant to fall.
+    """Yield all comparisons that the data set allows: none for body parts that the doll lacks, and
+    none at all for a recipe of the cause `no_fall`.
     """
     if not summary.recipe.falls:
         return

@@ -78,7 +78,9 @@ class DatasetSummary:
 
 
 def summarize(folder: Path) -> DatasetSummary:
-    """Read the labels of a data set; Unreadable or WrongForm if it has none that can be read."""
+    """Read the labels of a complete data set, and the samples of its first IMU. Raises Unreadable
+    or WrongForm if it is incomplete or has no labels that can be read.
+    """
     manifest = Manifest.read(folder)
     if 'lerobot' not in manifest.header['format'].split(','):
         raise WrongForm('format', manifest.header['format'], 'lerobot, to be described')

@@ -18,7 +18,7 @@ SHEET = 24
 
 
 def main(arguments: list[str]) -> int:
-    """Run `ragdoll_falls describe`; 0."""
+    """Run `ragdoll_falls describe`; returns the exit code 0."""
     options = parser().parse_args(arguments)
     summary = summarize(options.folder)
     numbers = np.unique(np.linspace(0, len(summary.hits) - 1, SHEET).round().astype(int))
@@ -84,7 +84,9 @@ def page_text(summary: DatasetSummary, drawn: list[str]) -> str:
 
 
 def _peaks(peaks: Peaks) -> list[str]:
-    """Heights and widths of a sensor's peaks, in a line; none without a sensor."""
+    """Heights and widths of a sensor's peaks, and how many are early, as a list of one line; empty
+    without samples.
+    """
     if not np.isfinite(peaks.largest).any():
         return []
     low, middle, high = np.nanpercentile(peaks.largest, [5, 50, 95])
@@ -103,7 +105,7 @@ def _bones(summary: DatasetSummary) -> list[str]:
 
 
 def _impacts(summary: DatasetSummary) -> list[str]:
-    """How hard regions of the body are hit; nothing where the bones have none."""
+    """Lines on how hard each region of the body is hit; empty if no bone has a region."""
     if not summary.regions:
         return []
     rows = [f'| {name} | {np.isfinite(ratios).mean():.0%} | {spread(forces, 0)} | '

@@ -73,8 +73,8 @@ def mean(normal: dict) -> float:
 
 
 def shifted_means(data: object, path: str = '') -> Iterator[str]:
-    """Warnings of truncated normal distributions whose mean is not that of their `normal`: another
-    by more than MEAN_SHIFT standard deviations.
+    """Warnings of truncated normal distributions whose mean differs from that of their `normal` by
+    more than MEAN_SHIFT standard deviations.
     """
     if isinstance(data, dict) and 'normal' in data:
         centre, deviation = data['normal']
@@ -90,7 +90,7 @@ def shifted_means(data: object, path: str = '') -> Iterator[str]:
 
 
 def choices(value: object) -> list:
-    """All possible values of one that is no number."""
+    """All possible values of a value that is not a number: those of its `choice`, or itself."""
     return value['choice'] if is_distribution(value) else [value]
 
 

@@ -18,9 +18,10 @@ SAMPLE_NAMES = ('ax', 'ay', 'az', 'wx', 'wy', 'wz')
 
 @dataclass(frozen=True)
 class Fall:
-    """Fall ``number`` of a recipe, t frames of n bones and k joint angles, world frame, SI units.
+    """Fall ``number`` of a recipe: t frames of n bones and k joint angles, world frame, SI units.
 
-    If the simulation failed, frames from the failure on hold NaN, and ``failure`` says why.
+    If the simulation failed, ``failure`` says why. From the failure on, ``states``, ``angles``,
+    ``rates`` and ``imu_states`` are NaN, and ``touching`` is False.
     """
 
     number: int
@@ -71,9 +72,10 @@ class Fall:
     def direction(self) -> float:
         """Direction of the centre of mass from the start to first contact, degrees in [-180, 180).
 
-        Relative to the doll's heading at the start: 0 forwards, 90 to its left; NaN if the fall
-        has no impact. Of a doll that moves horizontally at the start, that of the centre of mass
-        relative to the middle of the feet: who walks goes forwards, wherever the fall goes.
+        Relative to the doll's heading at the start: 0 forwards, 90 to its left; NaN if the fall has
+        no impact. If the doll has ``feet`` and moves horizontally at the start, the direction is
+        that from the middle of the feet to the centre of mass at first contact, because a walking
+        doll moves forwards, whatever the direction of its fall.
         """
         if self.phases.impact is None:
             return math.nan
@@ -88,7 +90,9 @@ class Fall:
 
     @property
     def impact_frames(self) -> np.ndarray:
-        """(n,) frame in which each bone first touches the ground; NaN if never or at once."""
+        """(n,) frame in which each bone first touches the ground; NaN if it never does, or does at
+        the start.
+        """
         return self._impacts[0]
 
     @property
@@ -119,7 +123,8 @@ def fall_samples(fall: Fall, imu: int) -> np.ndarray:
 
 
 def samples_by_frame(fall: Fall, imu: int) -> np.ndarray:
-    """The same samples by frame, (t, samples_per_frame, 6): those up to the frame's instant.
+    """The samples of fall_samples() by frame, (t, samples_per_frame, 6): those after the frame
+    before, up to the frame's instant.
 
     All samples of the first frame are equal.
     """
@@ -144,7 +149,7 @@ def response_of(sensor: dict) -> ImuResponse:
 
 
 def _named(kind: type, sensor: dict) -> dict:
-    """What a recipe's sensor has of a dataclass's fields."""
+    """Values that a recipe's sensor gives for the fields of the dataclass ``kind``, by name."""
     return {field.name: sensor[field.name] for field in fields(kind) if field.name in sensor}
 
 

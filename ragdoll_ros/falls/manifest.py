@@ -45,7 +45,9 @@ class Manifest:
 
     @classmethod
     def resume(cls, folder: Path, job: DatasetJob) -> Manifest:
-        """Read a folder's manifest and keep its complete shards; Unreadable if of another job.
+        """Read a folder's manifest and keep its complete shards. Removes an incomplete last line
+        and unfinished files. Raises Unreadable if it is of another recipe, format or library
+        version, or of more falls than the job.
 
         A shard is complete if it has all its falls and its files have their hashes.
         """
@@ -176,7 +178,8 @@ def _has_hash(path: Path, digest: str) -> bool:
 def build_dataset(job: DatasetJob, folder: Path, make: ShardMaker, resume: bool = False,
                      on_progress: Callable[[Manifest, int], None] = lambda manifest, new: None,
                      ) -> Manifest:
-    """Write all falls of a job into a folder; ``on_progress`` is called after each shard.
+    """Write all falls of a job into a folder; ``on_progress`` is called once at the beginning, and
+    after each shard.
 
     With ``resume``, complete shards in the folder are kept. Raises Unreadable if the folder holds
     falls already or, with ``resume``, other falls; OSError if a file cannot be written, in which

@@ -18,7 +18,7 @@ def _empty() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Peaks:
-    """Of a sensor in f falls; NaN where a fall has no sample."""
+    """Peaks of the specific force of a sensor in f falls; NaN where a fall has no sample."""
 
     sensor: str = ''
     bone: str = ''
@@ -34,9 +34,9 @@ class Peaks:
     @classmethod
     def of(cls, sensor: dict, falls: Iterable[np.ndarray], impacts: np.ndarray, pelvis: np.ndarray,
            interval: float) -> Peaks:
-        """Of samples (s, 3) m/s^2 of each fall, ``interval`` s apart, the first at the start;
-        ``impacts`` and ``pelvis`` (f,) s from the start to first contact and to that of the pelvis,
-        NaN without one.
+        """Find the peaks in samples (s, 3) m/s^2 of each fall, ``interval`` s apart, the first at
+        the start. ``impacts`` and ``pelvis`` (f,) are the times, s from the start, of the first
+        contact and of the first contact of the pelvis; NaN without one.
         """
         found = np.array([
             _peak(np.linalg.norm(samples, axis=1) / STANDARD_GRAVITY, times / interval)
@@ -47,8 +47,8 @@ class Peaks:
 
     @property
     def shares_early(self) -> tuple[float, float]:
-        """Shares of the falls that pass EARLY before the first contact, of those that have one, and
-        before the pelvis touches the ground, of those in which it does.
+        """Share of the falls with a first contact that exceed EARLY before it, and share of the
+        falls in which the pelvis touches the ground that exceed EARLY before it does.
         """
         return tuple(float((known > EARLY).mean()) if len(known) else 0.0 for known in (
             each[np.isfinite(each)] for each in (self.before_impact, self.before_pelvis)))

@@ -122,7 +122,7 @@ def _outlines(fall: Fall, frame: int, along: np.ndarray) -> list[np.ndarray]:
     """Outlines (c, 2) m of all bones projected on the plane of ``along`` and z, farthest first."""
     state = State.of(fall.states[frame])
     across = np.cross(along, (0, 0, 1))
-    order = np.argsort(-(state.positions @ across))
+    order = np.argsort(state.positions @ across)  # ``across`` points to the viewer
     made = []
     for bone in order:
         corners, _ = fall.scene.bones[bone].shape.mesh()

@@ -20,13 +20,14 @@ MAX_ATTEMPTS = 4
 
 
 class WorkersDied(RagdollError):
-    """A shard ended every process that tried to make it."""
+    """Worker processes died in all MAX_ATTEMPTS attempts at a shard."""
 
 
 def make_shards(job: DatasetJob, shards: Iterable[int], workers: int) -> Iterator[Shard]:
     """Yield shards, made by ``workers`` processes, each as soon as it is done.
 
-    Shards of a process that dies are made again; WorkersDied after MAX_ATTEMPTS at one of them.
+    If a process dies, all are replaced, and the shards that were queued or in work are made again;
+    WorkersDied after MAX_ATTEMPTS at one of them.
     """
     left, attempts = list(shards)[::-1], Counter()
     while left:

@@ -1,4 +1,5 @@
-"""A recipe: how falls are drawn, simulated and recorded. All errors are reported at once.
+"""A recipe: how falls are drawn, simulated and recorded. All errors found are reported at once; a
+check is skipped if a part of the data that it reads has an error.
 
 Its schema is config/recipe.schema.json.
 """
@@ -45,8 +46,8 @@ GRAB = {'at': 0.0, 'duration': 0.1}
 
 @dataclass(frozen=True)
 class Recipe:
-    """A recipe's ``data`` with defaults filled in, and its ``dolls``; of people, one of average
-    size, whose bones and joints all of them have.
+    """A recipe's ``data`` with defaults filled in, and its ``dolls``. A recipe of people has one
+    doll, of average size, with the bones and joints that all people have.
 
     ``data`` is plain JSON data and refers to no other file.
     """
@@ -59,7 +60,7 @@ class Recipe:
 
     @property
     def falls(self) -> bool:
-        """Whether what happens is a fall: phases are looked for."""
+        """Whether the recipe is of falls: its cause is not `no_fall`, and phases are looked for."""
         return self.data.get('cause') != 'no_fall'
 
     @property
@@ -89,14 +90,14 @@ class Recipe:
 
     @property
     def imus(self) -> list[dict]:
-        """Inertial sensors: name, bone, position m and orientation on it, and fields of ImuResponse
-        and ImuErrors.
+        """Inertial sensors: name, bone, position m and orientation on the bone, `contact_pulse`,
+        and fields of ImuResponse and ImuErrors.
         """
         return self.data['record']['imus']
 
     @property
     def warnings(self) -> list[str]:
-        """What its author may not have meant."""
+        """Warnings of distributions whose bounds shift their means, which may not be intended."""
         return list(shifted_means({key: part for key, part in self._drawn.items() if key != 'seed'
                                    and not (key == 'who' and 'dolls' in part)}))
 
@@ -107,12 +108,14 @@ class Recipe:
 
     @cached_property
     def philox_key(self) -> int:
-        """Key of the random generator, 128 bits: a hash of the DRAWN keys."""
+        """Key of the random generator, 128 bits: a hash of the data of the DRAWN keys, without the
+        stiffness of the ground.
+        """
         return int(_digest(self._drawn)[:32], 16)
 
     @property
     def stiffness(self) -> float:
-        """Of what is on the ground, N/m; infinity: nothing, or what is rigid."""
+        """Stiffness of what lies on the ground, N/m; infinite if nothing does or it is rigid."""
         return self.data['ground'].get('stiffness', math.inf)
 
     @property
@@ -131,8 +134,8 @@ class Recipe:
 
     def draw(self, number: int) -> dict:
         """Draw the values of fall ``number``: the recipe's ``start``, ``pushes``, ``limp``,
-        ``grabs`` and ``ground`` with a value in the place of each distribution, and ``who`` falls:
-        the index of a doll, or a person's sex, height m and bmi kg/m^2.
+        ``grabs`` and ``ground`` (without stiffness) with a value in the place of each distribution;
+        and ``who``, the index of the doll that falls, or the person's sex, height m and bmi kg/m^2.
 
         The generator is Philox (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, 2011);
         its counter begins at the fall's number times 2^192, so falls are drawn independently.
@@ -151,7 +154,9 @@ class Recipe:
 
 
 def load_recipe(name: str | Path) -> Recipe:
-    """Read a recipe by its path or its name in config/recipes/; ModelErrors lists every error."""
+    """Read a recipe by its path or its name in config/recipes/. Raises ModelErrors with all errors
+    found.
+    """
     data, path = read_by_name(str(name), RECIPES)
     return value_or_raise(path, *build_recipe(data, path))
 
@@ -165,7 +170,9 @@ def recipe_of(data: dict) -> Recipe:
 
 
 def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelError]]:
-    """Make a recipe from the data of the YAML file at ``path``: it, or None and every error."""
+    """Make a recipe from the data of the YAML file at ``path``. Returns the recipe and no errors,
+    or None and all errors found.
+    """
     found = schema_errors('recipe', data)
     if not is_marked(data, 'recipe'):
         return None, found
@@ -227,7 +234,9 @@ def _dolls(data: dict, path: Path) -> tuple[list[Ragdoll], list[ModelError]]:
 
 
 def _with_all_angles(start: dict, doll: Ragdoll) -> dict:
-    """The start with ``angle_shares``: a share of its range for each limited angle not given."""
+    """The start with ``angle_shares`` instead of ``other_angles``: this share of its range for each
+    limited angle not given; empty without ``other_angles``.
+    """
     start = dict(start)
     share = start.pop('other_angles', None)
     others = sorted(set(angle_limits_deg(doll)) - set(start['angles_deg']))

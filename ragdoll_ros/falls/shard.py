@@ -1,7 +1,7 @@
 """A shard: consecutive falls of a data set, as the bytes of its files.
 
-It depends on the recipe and the shard's number alone, so it is the same on every worker and in
-every order.
+A shard depends on its job and its number alone, so it is the same on every worker and in every
+order.
 """
 from dataclasses import dataclass
 

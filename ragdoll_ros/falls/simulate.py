@@ -35,7 +35,7 @@ def generate(recipe: Recipe, falls: Iterable[int]) -> Iterator[Fall]:
 
 @functools.cache
 def _limits() -> BiomechanicalLimits:
-    """Those of all falls, read once a process."""
+    """Biomechanical limits for all falls, read once per process."""
     return load_limits()
 
 
@@ -81,7 +81,9 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
 
 
 class _Hits:
-    """What met in a fall, and how long its impacts and the stops of its joints last."""
+    """Impacts of a fall: the worst ones, each contact, and the durations of impacts and of joint
+    stops.
+    """
 
     def __init__(self, recipe: Recipe, scene: Scene, limits: BiomechanicalLimits) -> None:
         self._limits = limits
@@ -115,8 +117,8 @@ class _Hits:
 
 
 def _once(impacts: Sequence[Impact]) -> Iterator[Impact]:
-    """The impacts of a tick without those of the second of two bones that meet, which come after
-    those of the first.
+    """Yield the impacts of a tick, each once: where two bones meet, both have an impact, and that
+    of the second, which follows, is left out.
     """
     for before, hit in zip((None, *impacts), impacts, strict=False):
         if before is None or (before.time, before.against, before.bone) != (
@@ -154,7 +156,7 @@ class _MovingHands:
 
 
 class _Recorder:
-    """Recorded frames, NaN where not recorded yet."""
+    """Recorded frames. Where not recorded yet, ``touching`` is False and the rest is NaN."""
 
     def __init__(self, recipe: Recipe, start: Start) -> None:
         count, self._per_frame = recipe.frames, recipe.samples_per_frame
@@ -205,7 +207,8 @@ class _Recorder:
 def begin(simulation: Simulation, start: Start) -> None:
     """Place the doll with its lowest point at the clearance, queue pushes, hold joints.
 
-    Bodies count: the doll is moved up along the ground's normal until it is in none.
+    If it then overlaps with bodies, it is moved up along the ground's normal until it does not, at
+    most by HIGHEST.
     """
     scene = start.scene
     normal = np.array(scene.ground.normal)
@@ -233,7 +236,9 @@ HIGHEST, PRECISION = 4.0, 1e-3
 
 
 def _lift_out_of_bodies(simulation: Simulation, normal: np.ndarray) -> None:
-    """Move the doll along ``normal`` (3,) until no body overlaps with it, by bisection."""
+    """Move the doll along ``normal`` (3,), by bisection, until no body overlaps with it, at most by
+    HIGHEST.
+    """
     names = {body.name for body in simulation.scene.bodies}
     start = simulation.coordinates
 

@@ -28,8 +28,8 @@ class JointRelease:
 
 @dataclass(frozen=True)
 class BoneHold:
-    """A ``bone`` whose centre of mass a hand holds from ``at`` to ``until``, ns: where it is, or on
-    the way to a point, with minimum jerk (Flash and Hogan 1985, J Neurosci 5:1688).
+    """A ``bone`` whose centre of mass a hand holds from ``at`` to ``until``, ns: in place, or while
+    the hand moves to a point, with minimum jerk (Flash and Hogan 1985, J Neurosci 5:1688).
     """
 
     at: int
@@ -41,7 +41,9 @@ class BoneHold:
     """Duration of that movement, ns."""
 
     def place(self, start: np.ndarray, time: int) -> np.ndarray:
-        """Where the hand is, (3,) m, that was at ``start`` (3,) when it grabbed."""
+        """Position (3,) m, at ``time`` ns, of the hand that was at ``start`` (3,) when it
+        grabbed.
+        """
         share = min(max((time - self.at) / self.takes, 0.0), 1.0)
         return start + share ** 3 * (10 - 15 * share + 6 * share ** 2) * (np.array(self.to) - start)
 
@@ -70,7 +72,9 @@ class Start:
                     *(grab.until for grab in self.grabs)])
 
     def coordinates(self, bound: GeneralizedState) -> GeneralizedState:
-        """Coordinates of the start, at the position of ``bound``, the scene's own."""
+        """Generalized state of the start: ``bound``, the scene's own, with the joint angles of the
+        start.
+        """
         layout = DofLayout([placement.doll for placement in self.scene.dolls])
         angles = layout.joint_angles(bound.q)
         for name, angle in self.angles.items():
@@ -120,16 +124,17 @@ def _uniform_orientation(first: float, second: float, third: float) -> np.ndarra
 
 
 def _with_friction(doll: Ragdoll, ground: dict) -> Ragdoll:
-    """The doll with bones that have the friction ``friction_under`` with the ground: a contact has
-    the geometric mean of the bone's and the ground's.
+    """The doll with bones that have the coefficients ``friction_under`` in contact with the ground.
+
+    A contact has the geometric mean of both sides' friction; if one is infinite, that of the other.
+    On a ground without friction they are 0.
     """
-    under = ground.get('friction_under', {})
-    if not under:
-        return doll
-    full = ground['friction']
+    under, full = ground.get('friction_under', {}), ground['friction']
+    factor = {name: value if math.isinf(full) else value ** 2 / full if full else 0.0
+              for name, value in under.items()}
     return replace(doll, bones=tuple(
-        replace(bone, friction=under[bone.name] ** 2 / full if full else 0.0)
-        if bone.name in under else bone for bone in doll.bones))
+        replace(bone, friction=factor[bone.name]) if bone.name in factor else bone
+        for bone in doll.bones)) if under else doll
 
 
 def _ground(drawn: dict, stiffness: float) -> Ground:
@@ -150,8 +155,8 @@ def _angles(doll: Ragdoll, start: dict) -> dict[str, float]:
 
 def _ankles(doll: Ragdoll, angles: dict[str, float], lean: np.ndarray,
             swing: str | None) -> dict[str, float]:
-    """Angles of a person's ankles, rad, but of the leg that swings, at which the soles are level
-    while the root has the orientation ``lean``; within the ranges of the ankles.
+    """Angles of a person's ankles, rad, without those of the swinging leg, at which the soles are
+    level while the root has the orientation ``lean``; within the ranges of the ankles.
     """
     limits = {name: pair for joint in doll.joints
               for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}

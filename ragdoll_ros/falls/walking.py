@@ -32,7 +32,7 @@ class Gait:
 
 def gait(doll: Ragdoll, angles: dict[str, float], speed: float, swing: str) -> Gait:
     """Velocities at which the root moves forwards at ``speed`` m/s, the stance foot rests, and the
-    foot of the side ``swing`` moves forwards at SWING_SPEED times ``speed``, by its hip.
+    foot of the side ``swing`` moves forwards at SWING_SPEED times ``speed``, moved by its hip.
 
     ``angles``: rad, by name, of a person's doll; those that are not named are zero.
     """

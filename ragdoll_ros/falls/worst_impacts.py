@@ -1,4 +1,6 @@
-"""The worst impacts of a fall: of each region of the body that which is nearest to its limit."""
+"""The worst impacts of a fall: for each region of the body, the impact with the largest ratio of
+peak force to limit.
+"""
 from __future__ import annotations
 
 import math
@@ -13,7 +15,7 @@ from ..physics.sensors.impacts import Impact
 
 @dataclass(frozen=True)
 class WorstImpacts:
-    """Of the regions that a doll's bones have, in the order of the limits."""
+    """Worst impacts in the regions that a doll's bones have, in the order of the limits."""
 
     by_region: dict[str, Impact | None]
     """The impact with the largest ratio to the limit; None if there is none."""
@@ -22,12 +24,12 @@ class WorstImpacts:
 
     @classmethod
     def none_yet(cls, scene: Scene, limits: BiomechanicalLimits) -> WorstImpacts:
-        """Before the first impact."""
+        """The worst impacts before the first impact: None for each region that a bone has."""
         own = {limits.region_of(bone.name) for bone in scene.bones}
         return cls(dict.fromkeys(region for region in limits.regions if region in own))
 
     def after(self, impacts: Iterable[Impact], limits: BiomechanicalLimits) -> WorstImpacts:
-        """After more impacts."""
+        """The worst impacts after more ``impacts``."""
         worst, hic15 = dict(self.by_region), self.hic15
         for impact in impacts:
             if impact.region not in worst:

@@ -31,15 +31,17 @@ through 60 samples per s miss the velocity by less than 1e-4 rad/s."""
 
 
 class BodyMotions(Protocol):
-    """Motions of the bodies of a doll over time, by a file, in the doll's frame."""
+    """Protocol of the motions of a doll's bodies over time, read from a file, in the
+    doll's frame.
+    """
 
     @property
     def duration(self) -> float:
-        """s, from its beginning at 0. Raises a ModelError for a broken track."""
+        """Duration, s, from 0 to the last key. Raises a ModelError for a broken track."""
 
     @property
     def key_times(self) -> np.ndarray:
-        """(k,) s, of the file's keys."""
+        """Times (k,) of the file's keys, s."""
 
     def at(self, times: np.ndarray) -> dict[str, BoneMotion]:
         """Motions of the bodies by their names, at ``times`` (...) s."""
@@ -47,8 +49,8 @@ class BodyMotions(Protocol):
 
 @dataclass(frozen=True, repr=False)
 class Animation:
-    """An animation of the file of a doll's character, with its unique ``name`` there; or of a .bvh
-    ``file``, whose joints ``bones`` names for bodies.
+    """An animation of a doll: from the file of its character, where ``name`` is unique, or from a
+    .bvh ``file``. ``bones`` has the names of that file's joints that were chosen, by body.
     """
 
     name: str
@@ -62,15 +64,16 @@ class Animation:
 
     @property
     def duration(self) -> float:
-        """s, from its beginning at 0. Raises a ModelError for a broken track."""
+        """Duration, s, from 0 to the last key. Raises a ModelError for a broken track."""
         return self._source.duration
 
     def at(self, time: float) -> FollowedMotion:
-        """The doll's motion at ``time`` s from the beginning, in the doll's frame of the bind pose.
+        """Return the doll's motion at ``time`` s from the beginning, in the animation's frame: the
+        doll's frame in the bind pose.
 
-        Its velocities are derivatives of the file's interpolation; at a key the mean of both
-        sides. Raises OutOfRange for a time that is not within the animation, another ModelError
-        for a broken track.
+        Velocities are derivatives of the interpolated keys, see KeyTrack; at a key, the mean of
+        both sides. Raises OutOfRange for a time that is not within the animation, another
+        ModelError for a broken track.
         """
         errors.check_range('time', time, 0.0, self.duration)
         return follow_motions(self.doll, self._source.at(np.array(time)))
@@ -78,7 +81,8 @@ class Animation:
     @functools.cached_property
     def motion(self) -> MotionSpline:
         """The doll's motion in the doll's frame: splines through samples at the keys of the file
-        and at least SAMPLE_RATE times a second. Raises a ModelError for a broken track.
+        and at least SAMPLE_RATE times a second. Raises a ModelError for a broken track, or for more
+        than MOST_SAMPLES samples.
         """
         keys = np.unique(np.append([0.0, self.duration], self._source.key_times))
         keys = keys[np.append(np.diff(keys) > KEY_TOLERANCE, True)]
@@ -93,22 +97,23 @@ class Animation:
         return MotionSpline.sampled(*_coordinates(self.doll, times, motions))
 
     def place(self, placement: Placement, time: float) -> Placement:
-        """The doll of ``placement`` as the animation has it at ``time`` s, with its velocities.
+        """Return ``placement`` with the pose and velocities that the animation has at ``time`` s.
 
         Position and orientation of the placement are those of the animation's frame; its velocity
-        is added. Raises OutOfRange for the time, WrongForm for a placement of another doll or with
-        a spin, angles or rates.
+        is added. Raises OutOfRange for the time, WrongForm for a placement whose doll lacks a body
+        of the animation, or with a spin, angles or rates.
         """
         return placed(placement, self.at(time))
 
     def play(self, placement: Placement, start: float = 0.0, speed: float = 1.0,
              loop: bool = False, limp_at: float = math.inf,
              limp_above: float = math.inf) -> Placement:
-        """The doll of ``placement``, which the animation moves until it goes limp: see Playback.
+        """Return ``placement`` with its doll moved by the animation until the doll goes limp: see
+        Playback.
 
         Position, orientation and velocity of the placement are those of the animation's frame.
-        Raises OutOfRange or NotPositive for a number, WrongForm for a placement of another doll or
-        with a spin, angles or rates.
+        Raises OutOfRange, NotPositive or NotFinite for a number, WrongForm for a placement of
+        another doll or with a spin, angles or rates.
         """
         return dataclasses.replace(placement, animation=Playback(
             self.name, self.motion, start, speed, loop, limp_at, limp_above, self.file, self.bones))
@@ -116,7 +121,9 @@ class Animation:
 
 def _coordinates(doll: Ragdoll, times: np.ndarray, motions: dict[str, BoneMotion]
                  ) -> tuple[DofLayout, np.ndarray, list[GeneralizedState]]:
-    """Layout, ``times`` (k,), and coordinates of the doll as it follows ``motions``, stacked."""
+    """Return the doll's layout, ``times`` (k,), and the doll's coordinates and velocities at each
+    of them, as it follows ``motions``, stacked over the times.
+    """
     layout, root, found = DofLayout([doll]), motions[doll.root.name], follow_turns(doll, motions)
     names = [name for joint in doll.joints for name in joint.angle_names]
     zero = np.zeros(len(times))
@@ -155,23 +162,25 @@ def placed(placement: Placement, motion: FollowedMotion) -> Placement:
 
 def load_animations(doll: Ragdoll, file: str | Path | None = None,
                     bones: Mapping[str, str] | None = None) -> dict[str, Animation]:
-    """Read the animations of the file of a doll's character, or one of motion capture.
+    """Read the animations of the file of a doll's character, or of a motion capture file.
 
     Args:
-        doll: without ``file`` as ragdoll_fit makes it of a .glb, .gltf or .vrm: it has a ``model``
-            and riders. With ``file`` any doll.
+        doll: without ``file``, a doll that ragdoll_fit made of a .glb, .gltf or .vrm: it has a
+            ``model`` and riders. With ``file``, any doll.
         file: a .bvh, whose joints have the names of the doll's bodies or riders, or common names of
             a person's.
-        bones: names of joints of the file by those of bodies, where others are to be taken.
+        bones: names of joints of the file, by body, for bodies whose joint is chosen here instead
+            of found by name.
 
     Returns:
-        Animations by their names, in the order of the file; of a .bvh one with its file's name.
+        Animations by their names, in the order of the file; of a .bvh, one that has the name
+        of the file without its suffix.
 
     Raises:
         WrongForm: for a doll without a character, a bone whose bind pose has no size, or a .bvh
-            none of whose joints is a body's.
-        UnknownBone, UnknownJoint: if the file has not the bones of the doll's riders, or for
-            ``bones``.
+            none of whose joints belongs to a body.
+        UnknownBone: for a wrong body in ``bones``, or a rider that the file does not have.
+        UnknownJoint: for a joint in ``bones`` that the file lacks.
         ModelErrors: if the file cannot be read.
 
     Example:

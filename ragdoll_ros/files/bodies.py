@@ -35,7 +35,7 @@ EXACT = 'exact'
 
 
 class SceneBodies(NamedTuple):
-    """What `bodies:` of a scene says."""
+    """The bodies and robots that `bodies:` of a scene defines."""
 
     static: list[StaticBody]
     loose: list[Placement]
@@ -137,7 +137,7 @@ def _static_body(entry: dict, folder: Path) -> StaticBody:
 
 
 def _loose_body(entry: dict, folder: Path) -> Placement:
-    """A doll of one bone: a uniform solid, its frame that of the body's shape."""
+    """Build a doll of one bone, a uniform solid; the doll's frame is that of the body's shape."""
     _check_options(entry)
     if 'stiffness' in entry:
         raise WrongForm('stiffness', entry['stiffness'], 'none: of bodies that never move only')
@@ -162,7 +162,7 @@ def _loose_body(entry: dict, folder: Path) -> Placement:
 
 
 def _moving_shape(entry: dict, kind: str | None, folder: Path) -> Shape | Compound:
-    """The shape of a body that moves; one hull is a Compound of it."""
+    """Return the shape of a body that moves; a single hull becomes a Compound of one part."""
     if kind is None:
         return build_shape(entry, folder)
     hull = build_surface(entry, folder)

@@ -1,8 +1,8 @@
 """KeyTrack: a translation, rotation or scale over time by its keys, and its derivative.
 
-The derivative is that of the interpolation: of LINEAR keys constant between two, of STEP keys zero,
-of CUBICSPLINE keys that of the spline; at a key the mean of both sides. Before its first key and
-after its last, a track stands.
+The derivative is that of the interpolation: constant between LINEAR keys (of rotations, the angular
+velocity is), zero for STEP keys, that of the spline for CUBICSPLINE keys; at a key, the mean of
+both sides. Before its first key and after its last, a track is constant.
 """
 from __future__ import annotations
 
@@ -31,8 +31,9 @@ class KeyTrack:
 
     @classmethod
     def sampled(cls, times: np.ndarray, values: np.ndarray, is_rotation: bool) -> KeyTrack:
-        """A smooth motion through samples (k, w) at equal steps: a cubic spline, whose slopes are
-        centred differences of order 4.
+        """Return a smooth motion through samples (k, w) at equal steps: a cubic spline, whose
+        slopes are centred differences of order 4, near the ends of order 2. Fewer than three
+        samples are LINEAR keys.
         """
         if len(times) < 3:
             keys = np.pad(values[:, None], ((0, 0), (1, 1), (0, 0)))

@@ -1,8 +1,8 @@
 """A scene as MJCF for MuJoCo: the same bodies, joints, limits, damping and ground.
 
 A body's frame is its bone's: centre of mass and the shape's axes. MuJoCo's quaternions are w, x, y,
-z. Several hinges of one body act in series, the second axis fixed after the first: a universal
-joint. Approximations:
+z. Several hinges of one body act in series, each axis turned by the hinges before it: two are a
+universal joint. Approximations:
 - a ball joint with limits is three hinges, as in urdf.py;
 - restitution is a spring and a damper in the contact, and needs small steps;
 - friction is finite; MuJoCo takes the larger of a pair, so each bone has the combined coefficient
@@ -28,7 +28,8 @@ UNLIMITED = (0.0, 0.0, 1.0)
 """Size of a plane without an end; the last number is the spacing of what is drawn."""
 
 CONTACT_TIME = 0.02
-"""s, time constant of a contact, MuJoCo's default; the engine sets one for its step."""
+"""s, time constant of a contact without restitution, MuJoCo's default. With restitution the
+frequency is the same, 1 / (time constant * damping ratio). The engine sets one for its step."""
 
 
 def to_mjcf(scene: Scene, excluded: Collection[frozenset[str]] = ()) -> str:
@@ -132,7 +133,9 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
 
 
 def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
-    """Attributes of one element for each axis, in the child's frame; none for a fixed joint."""
+    """Yield the attributes of each joint element, in the child's frame: one ball for a ball joint
+    without limits, else a hinge for each axis; none for a fixed joint.
+    """
     back = rotation.inverse(child.orientation)
     place = {'pos': _text(child.pose.apply_inverse(joint.anchor)), 'damping': repr(joint.damping)}
     if joint.is_free_ball:
@@ -166,10 +169,10 @@ def _material(scene: Scene, bone: Bone | StaticBody | None) -> dict[str, str]:
     friction = math.sqrt(finite_friction(friction) * finite_friction(scene.material.friction))
     if bone is None:
         friction = rolling = 0.0
-    restitution = math.sqrt(restitution * scene.material.restitution)
+    ratio = damping_ratio(math.sqrt(restitution * scene.material.restitution))
     return {'friction': _text((friction, 0.0, rolling)),
             'condim': '6' if rolling else '3',
-            'solref': _text((CONTACT_TIME, damping_ratio(restitution)))}
+            'solref': _text((CONTACT_TIME / ratio, ratio))}
 
 
 def _quaternion(q: np.ndarray) -> str:

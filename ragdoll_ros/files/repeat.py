@@ -14,13 +14,13 @@ Placed = TypeVar('Placed', Placement, StaticBody, PlacedRobot)
 
 
 def repeated(first: Placed, repeat: dict) -> list[Placed]:
-    """Copies of a doll or a body, named ``name_1`` on; ``repeat`` as in scene.schema.json.
+    """Return copies of a doll or a body, named ``name_1`` on; ``repeat`` as in scene.schema.json.
 
     Each copy is ``shift`` farther than the one before. A grid starts at the first's position and
     fills x, then y, then z; each copy is then moved by up to half of ``spread`` along each axis.
-    The same seed gives the same copies. ``turned: yaw`` rotates by up to 180 degrees about the
-    vertical through the doll's centre of mass or the body's origin, any other by a random rotation
-    about the origin of its frame.
+    The same seed gives the same copies. ``turned: yaw`` rotates each copy by up to 180 degrees
+    about the vertical through the doll's centre of mass or the body's origin; ``turned: true``
+    gives it a random orientation about the origin of its frame.
     """
     count, rng = int(repeat['count']), np.random.default_rng(int(repeat.get('seed', 0)))
     columns = repeat.get('columns') or [math.ceil(math.sqrt(count))] * 2
@@ -44,8 +44,8 @@ def repeated(first: Placed, repeat: dict) -> list[Placed]:
 
 def _yawed(first: Placement | StaticBody | PlacedRobot, place: np.ndarray,
            angle: float) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Position (3,) m and orientation of a copy, rotated by ``angle`` rad about the vertical
-    through its centre of mass or origin; before, its frame is at ``place``.
+    """Return position (3,) m and orientation of a copy, rotated by ``angle`` rad about the vertical
+    through its centre of mass or origin; ``place`` is its position before.
     """
     turn = rotation.from_axis_angle((0.0, 0.0, 1.0), angle)
     center = first.mass_centre if isinstance(first, Placement) else np.zeros(3)

@@ -1,5 +1,5 @@
-"""The scene of a run as YAML, with the versions of the libraries that computed it: ~/scene. A doll
-that comes later in the same form.
+"""The scene of a run as YAML, with the versions of the libraries that computed the run: ~/scene. A
+doll that is added later is written in the same form.
 """
 import dataclasses
 import functools
@@ -66,8 +66,9 @@ def entry_text(placement: Placement) -> str:
 
 
 def run_scene_text(scene: Scene, texts: SceneTexts | None = None) -> str:
-    """YAML of a scene with its dolls; read_run_scene reads an equal one. It is that of
-    scene_text(), which writes a doll that several placements share once.
+    """Return YAML of a scene with its dolls; read_run_scene reads an equal one. The text is that of
+    scene_text(), which writes a doll that several placements share once. ``texts`` keeps the texts
+    of dolls and placements from scene to scene.
     """
     texts = texts or SceneTexts()
     first = dataclasses.replace(scene, dolls=scene.dolls[:1], robots=())

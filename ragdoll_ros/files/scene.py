@@ -146,7 +146,9 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
 
 
 def _at_entry(error: ModelError, made_by: dict[str, list[str]]) -> ModelError:
-    """The error of a name, at the entry that made what has it: `repeat` makes many of one."""
+    """Return an error of a name with the path of the entry that made what has the name, as `repeat`
+    makes many of one entry; any other error unchanged.
+    """
     place = re.fullmatch(r'(dolls|bodies)\[(\d+)\]\.name', error.path)
     if place is None:
         return error
@@ -238,7 +240,9 @@ def _motors_data(motors: Motors) -> dict:
 
 
 def _animated(copies: list[Placement], entry: dict, folder: Path) -> list[Placement]:
-    """The copies of a doll with its entry's animation, or limp as it has them at its ``time``."""
+    """Return the copies of a doll with the animation of their entry; with a ``time``, limp in the
+    pose and with the velocities of the animation at that time.
+    """
     for key in ('spin', 'follow', *ANGLE_KEYS.values()):
         if key in entry:
             raise WrongForm(key, entry[key], 'none: the animation has its own')
@@ -285,7 +289,7 @@ def _animation(doll: Ragdoll, wanted: dict, folder: Path) -> Animation:
 
 
 def _playback_data(playback: Playback, folder: Path | None) -> dict:
-    """What plays a doll's animation, as its entry has it."""
+    """Return a playback as ``animation`` of an entry, in the form of scene.schema.json."""
     keys = ('name', *PLAYBACK_KEYS)
     data = {key: value for key in keys if (value := getattr(playback, key)) != math.inf}
     if playback.file is not None:

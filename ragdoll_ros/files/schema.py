@@ -24,7 +24,7 @@ set a node's scene could read any file by them."""
 
 
 def is_marked(data: object, schema: str) -> TypeGuard[dict]:
-    """Whether data may be meant as a scene, a doll, a recipe of falls or limits."""
+    """Whether data may be meant for the schema: a mapping with the key that MARKS has for it."""
     return isinstance(data, dict) and MARKS[schema] in data
 
 
@@ -55,7 +55,9 @@ def _kind(schema: str) -> str:
 
 
 def _wrong(error: jsonschema.ValidationError) -> object:
-    """The wrong value of an error; of a mapping, its keys or the unknown ones."""
+    """Return the wrong value of an error: for oneOf the keys of the mapping, for
+    additionalProperties its unknown keys, else the value itself.
+    """
     if error.validator == 'oneOf':
         return ', '.join(map(str, error.instance))
     if error.validator != 'additionalProperties':
@@ -99,7 +101,9 @@ def _validator(name: str) -> jsonschema.Draft7Validator:
 
 
 def _read(name: str) -> dict:
-    """A schema in config/; references to the doll's are made its own."""
+    """Read a schema in config/; its references to doll.schema.json are made references to
+    itself.
+    """
     text = (config.config_folder() / f'{name}.schema.json').read_text(encoding='utf-8')
     return json.loads(text.replace('"doll.schema.json#', '"#'))
 

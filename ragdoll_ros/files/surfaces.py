@@ -1,5 +1,5 @@
-"""Shapes that static bodies alone have, planes, height fields from numbers, .npy and pictures, and
-meshes; and hulls of meshes, one or several, which move as parts of a Compound.
+"""Shapes that only static bodies have: planes, meshes, and height fields from numbers, .npy files
+and pictures. Also hulls of meshes, one or several, which move as parts of a Compound.
 """
 import dataclasses
 from collections.abc import Callable
@@ -51,7 +51,7 @@ def build_surface(entry: dict, folder: Path) -> Surface | Plane:
 
 
 def build_hull(data: dict, folder: Path) -> Hull:
-    """The hull of a part of a body, without its file. Raises ModelError."""
+    """Build the hull of a part of a body; its file is not kept. Raises ModelError."""
     try:
         hull = _mesh(Hull.kind, data, folder)
     except errors.ModelError as error:

@@ -1,14 +1,15 @@
 """Ragdoll to URDF.
 
 A link's frame has the doll's axes in the bind pose and its origin at the joint's anchor (the
-root's: at its centre of mass); of a ball joint's link z is the twist axis. URDF has no universal
-or ball joint: they are revolute joints in series with links child/1, child/2 between them. A joint
-has the name of its angle.
+root's: at its centre of mass); of a ball joint's link z is the twist axis. URDF has no universal or
+ball joint: they are revolute joints in series with links child/1, child/2 between them. A joint has
+the name of its angle.
 
-Dialects: 'ros' is what urdfdom reads; 'bullet' has capsules, massless links, and PyBullet's
-spherical joint for a ball joint without limits (its own limits do not hold: measured, 2 rad past
-0.5 rad). PyBullet measures that joint in the frame of the child's inertia, so it has a massless
-link in the joint's frame, to which the child is fixed. Effort and velocity are zero: no motor.
+Dialects: 'ros' is what urdfdom reads. 'bullet' has capsules, massless links, effort and velocity
+zero (no motor), and PyBullet's spherical joint for a ball joint without limits (a spherical joint's
+own limits do not hold: measured, 2 rad past 0.5 rad). PyBullet measures a spherical joint in the
+frame of the child's inertia, so the joint moves a massless link in the joint's frame, to which the
+child is fixed.
 """
 from collections.abc import Iterator, Sequence
 

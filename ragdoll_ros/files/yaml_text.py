@@ -41,7 +41,9 @@ CHARACTERS = ('.glb', '.gltf', '.vrm', '.urdf', '.xacro')
 
 
 def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
-    """An int; infinite if it exceeds a float, as 1e400 is, to be refused as such."""
+    """Return an int; infinity if it exceeds the largest float, as 1e400 does, so that it is refused
+    as infinite.
+    """
     number = loader.construct_yaml_int(node)
     try:
         float(number)

@@ -144,7 +144,9 @@ def _run(options: argparse.Namespace) -> list[Verdict]:
 
 
 def _scene(options: argparse.Namespace, placements: list[Placement]) -> Scene:
-    """The dolls above the ground; a scene of several that was read, as it is."""
+    """Scene with the dolls above the ground; a scene file with several dolls is returned
+    as it is.
+    """
     if Path(options.input).suffix.lower() in DOLL_SUFFIXES and len(placements) > 1:
         return load_scene(options.input)
     return all_above_ground(Path(options.output or options.input).stem, placements)

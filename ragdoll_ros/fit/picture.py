@@ -65,10 +65,10 @@ def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
 
 
 def joint_range_arcs(doll: Ragdoll) -> list[tuple[int, np.ndarray]]:
-    """Sector (p, 3) m of each limited joint angle, doll's frame, and the angle's number, 0 to 2.
+    """Number, 0 to 2, and sector (p, 3) m, doll's frame, of each limited joint angle.
 
-    The polygon runs from the anchor along the arc of the child's direction as this angle alone
-    goes from limit to limit, and back to the anchor.
+    The polygon runs from the anchor along the arc of the child's direction as this angle alone goes
+    from limit to limit, and back to the anchor.
     """
     return [(number, np.concatenate([[joint.anchor], joint.anchor + arc, [joint.anchor]]))
             for joint in doll.joints
@@ -100,7 +100,7 @@ def _triangles(bone: Bone) -> np.ndarray:
 
 
 def _draw_solids(axes: object, solids: list[tuple[np.ndarray, np.ndarray]], alpha: float) -> None:
-    """Draw all triangles in one collection, which is what matplotlib sorts by depth."""
+    """Draw all triangles in one collection, because matplotlib sorts by depth only within one."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
     corners = np.concatenate([triangles for triangles, _ in solids])
     base = np.concatenate([np.tile(color, (len(triangles), 1)) for triangles, color in solids])

@@ -216,7 +216,7 @@ def _roles_along(tree: SkinTree, names: tuple[str, ...]) -> tuple[str | None, ..
 def _note_unweighted(character: Character, given: int, groups: list[BodyGroup]) -> list[str]:
     """Note on unweighted vertices; if all are, the root gets the whole skin.
 
-    Counted are the character's own vertices, the first ``given``.
+    Only the first ``given`` vertices, those before subdivision, are counted.
     """
     unweighted = int((character.weights[:given].sum(axis=1) == 0).sum())
     if unweighted == given:
@@ -246,7 +246,7 @@ def _bone_direction(character: Character, groups: list[BodyGroup], index: int) -
 
 def _fit_shapes(character: Character, groups: list[BodyGroup], axes: list[Axes],
                 kind: str) -> list[FittedShape]:
-    """Shape of each group, centred in the doll's frame; left and right are of the same kind."""
+    """Shape of each group, its centre in the doll's frame; left and right are of the same kind."""
     extent = character.extent
     sizes = (MIN_THICKNESS * extent, min(TOLERANCE, 0.006 * extent))
     clouds = [(character.vertices[group.vertices] if len(group.vertices)
@@ -293,8 +293,10 @@ def _skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[Sk
 
 
 def _links_of_bones(character: Character, carrier: dict[int, Bone]) -> dict[int, tuple[int, int]]:
-    """Spring and link of each bone that one moves: those of the chains, and those below them in
-    the file that are not part of another body.
+    """Indices of the spring bone and of its link, for each bone that one of them moves.
+
+    These are the bones of the chains, and the bones below them in the file that are not part of
+    another body.
     """
     found = {bone: (number, link) for number, spring in enumerate(character.springs)
              for bone, link in zip(spring.bones, spring.links, strict=True)}

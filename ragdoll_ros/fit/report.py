@@ -46,7 +46,10 @@ def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:
 
 
 def animations_report(doll: Ragdoll) -> list[str]:
-    """A line for each animation of the file of a fitted doll: how well the doll can follow it."""
+    """A line for each of a file's first animations: how well the fitted doll can follow it.
+
+    Further lines name the animations beyond COMPARED_ANIMATIONS.
+    """
     try:
         animations = list(load_animations(doll).values())
     except RagdollError as error:

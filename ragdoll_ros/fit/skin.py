@@ -1,9 +1,9 @@
 """Skin of a fitted character, moved by its doll's bones.
 
-All riders of a bone, or of a link of a swing, move as one rigid body, so a page or a file needs as
-joints only the bones and links that carry riders: with the pose T_j of joint j and the sum W_j of
-its riders' weights, a vertex v of the bind pose is at sum of W_j T_j inv(T_j in the bind pose) v
-(model/skeleton.py, summed by joint).
+All riders of a bone, or of a link of a swing, move as one rigid body. The only joints that a page
+or a file needs are therefore the bones and links that carry riders. With the pose T_j of joint j
+and the sum W_j of its riders' weights, a vertex v of the bind pose is at sum of W_j T_j inv(T_j in
+the bind pose) v (model/skeleton.py, summed by joint).
 """
 import functools
 import os

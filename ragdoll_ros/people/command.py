@@ -73,13 +73,13 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _angles(doll: Ragdoll, passive: bool) -> str:
-    """Names of the joint angles with a passive torque, or of those without; of limbs the left."""
+    """Names of the angles of joints with passive torques, or of those without; left limbs only."""
     return ', '.join(name for joint in doll.joints if not joint.child.startswith('right_')
                      and bool(joint.passive) == passive for name in joint.angle_names)
 
 
 def _table(doll: Ragdoll) -> str:
-    """Mass, centre and inertia of each bone; of limbs the left ones."""
+    """Table of the mass, centre and inertia of each bone; of the limbs, only the left ones."""
     lines = [f'{"bone":16} {"kg":>7} {"centre x, z, m":>16} {"Ixx, Iyy, Izz, kg m^2":>30}']
     for bone in doll.bones:
         if not bone.name.startswith('right_'):

@@ -65,9 +65,10 @@ def bone_impacts(states: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, 
 
 def part_impact(part: str, names: Sequence[str], frames: np.ndarray,
                 speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frame and speed (...) at which a body part, as 'pelvis', first hits; NaN if never.
+    """Frame and speed (...) at which a body part, such as 'pelvis', first hits; NaN if never.
 
-    ``frames`` and ``speeds`` (..., n) are those of the bones ``names`` in (...) falls.
+    ``frames`` and ``speeds`` (..., n) are those of the bones ``names``; (...) is the shape of the
+    falls.
     """
     bones = bones_of(part, list(names))
     if not bones:

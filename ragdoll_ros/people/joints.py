@@ -5,9 +5,9 @@ x (forwards), yaw about z (up) for trunk and head, about the length (down) for l
 negative at hips and elbows, positive at knees and neck.
 
 Ranges are the norms of the American Academy of Orthopaedic Surgeons (Joint Motion: Method of
-Measuring and Recording, 1965), of the trunk half at the waist, half at the chest. Abduction of an
-arm ends at 85 degrees, the limit of ball joints here; it goes higher by its pitch. Within the range
-there is only damping, and passive torques on request.
+Measuring and Recording, 1965). Half of the trunk's range is at the waist, half at the chest.
+Abduction of an arm ends at 85 degrees, the limit of ball joints here; the arm goes higher by its
+pitch. Within the range there is only damping, and passive torques on request.
 """
 import math
 

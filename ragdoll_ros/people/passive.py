@@ -3,9 +3,9 @@
 Coefficients of Anderson (1999) as published with Falisse et al. 2019 (J R Soc Interface
 16:20190402, github.com/antoinefalisse/3dpredictsim), here with the signs of joints.py. They are
 those of a man of the table's mass and height, and scale with mass times height squared, as his
-damping does. Of the trunk, the source has one joint, at the lumbar spine; waist and chest are two
-in series, each with half the angle at the same torque. Shoulders, elbows, wrists and neck have none
-in that source.
+damping does. For the trunk the source has one joint, at the lumbar spine; waist and chest are two
+in series, each with half the angle at the same torque. The source has no torques for shoulders,
+elbows, wrists and neck.
 """
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ limit lies: it guards what the torque alone would already have stopped."""
 
 def _ends(lower: tuple[float, float, float], upper: tuple[float, float, float],
           joints: int = 1) -> Passive:
-    """Of torque, N m, angle, rad, and growth, 1/rad, shared by ``joints`` in series."""
+    """Passive torques of a lower and an upper end, shared by ``joints`` in series. Each end is
+    given by torque, N m, angle, rad, and growth, 1/rad.
+    """
     return Passive(*(PassiveEnd(torque, angle / joints, 1 / (growth * joints))
                      for torque, angle, growth in (lower, upper)))
 
@@ -68,8 +70,9 @@ tables 3 and 2 of Watt, Callaway and Williams 2022, Med Biol Eng Comput 60:2133)
 
 
 def end_widths(doll: Ragdoll) -> dict[str, tuple[float, float]]:
-    """Widths in which what stops a person's joint angles grows e-fold towards the lower and the
-    upper end, rad, by the angle's name; none for a doll without any angle of the source.
+    """Widths, rad, of the lower and the upper end of each of a person's joint angles, by its name:
+    over a width, the torque that stops the angle grows e-fold. Empty for a doll without any angle
+    of the source.
     """
     angles = [(name, limits, bool(joint.passive)) for joint in doll.joints
               for name, limits in zip(joint.angle_names, joint.angle_limits, strict=True)]
@@ -79,7 +82,9 @@ def end_widths(doll: Ragdoll) -> dict[str, tuple[float, float]]:
 
 
 def _widths(name: str, limits: Limits | None, passive: bool) -> tuple[float, float]:
-    """Of one angle; ``passive``: its torques are simulated, and the limits guard them."""
+    """Widths of the two ends of one angle, rad; ``passive``: its torques are simulated, and the
+    limits are beyond them.
+    """
     if limits and not passive and name.endswith(('waist', 'chest')):
         return TRUNK_WIDTH * -limits[0], TRUNK_WIDTH * limits[1]
     if name[2:] in MEASURED_WIDTHS and not passive:
@@ -95,8 +100,8 @@ def _torque_of(name: str) -> Passive | None:
 
 
 def with_passive_torques(joint: Joint, scale: float) -> Joint:
-    """A joint with the torques that its angles have in the source, times ``scale``, and with hard
-    limits beyond; the joint itself if it has none there.
+    """A joint with the torques that the source has for its angles, times ``scale``, and with hard
+    limits beyond them; unchanged if the source has none.
     """
     found = [_torque_of(name) for name in joint.angle_names]
     if not any(found):
@@ -109,7 +114,7 @@ def with_passive_torques(joint: Joint, scale: float) -> Joint:
 
 
 def _guards(passive: Passive) -> tuple[float, float]:
-    """Angles, rad, at which the torques are GUARD_TORQUE."""
+    """Lower and upper angle, rad, at which the passive torques, without scale, are GUARD_TORQUE."""
     low, high = (end.width * math.log(GUARD_TORQUE / end.torque)
                  for end in (passive.lower, passive.upper))
     return passive.lower.angle - low, passive.upper.angle + high

@@ -1,8 +1,9 @@
-"""A person of a height, mass and sex as a doll: 16 segments after de Leva 1996; its standing.
+"""A person of a height, mass and sex as a doll: 16 segments after de Leva 1996. Springs that hold
+it upright.
 
-It stands: arms down, palms forwards, soles on z = 0, x forwards. Masses, centres and inertias are
-the table's, normalised to the total mass; lengths are the table's shares of the height, the neck is
-the remainder (see model/anthropometry.py). Shapes are for collision only and have no mass.
+The doll stands: arms down, palms forwards, soles on z = 0, x forwards. Masses, centres and inertias
+are the table's, normalised to the total mass; lengths are the table's shares of the height, and the
+neck is the remainder (see model/anthropometry.py). Shapes are for collision only and have no mass.
 """
 import numpy as np
 
@@ -86,9 +87,10 @@ def person(height: float, mass: float, sex: str, name: str = 'person',
 def standing(doll: Ragdoll) -> dict[str, tuple[float, float]]:
     """Springs that hold a person upright: stiffness, N m/rad, and damping, N m s/rad, by angle.
 
-    For Simulation.hold. The stiffness is weight times height per rad. An inverted pendulum about
-    both ankles needs the weight times the height of the centre of mass for both together (Winter,
-    Patla et al. 1998, J Neurophysiol 80:1211).
+    For Simulation.hold. The stiffness is weight times height per rad, where the height is that of
+    the highest bone's centre above the lowest one's; arms have ARM_STIFFNESS of it. An inverted
+    pendulum about both ankles needs the weight times the height of the centre of mass for both
+    together (Winter, Patla et al. 1998, J Neurophysiol 80:1211).
     """
     height = float(np.ptp([bone.position[2] for bone in doll.bones]))
     full = doll.mass * GRAVITY * height
@@ -111,9 +113,9 @@ def _bone(name: str, part: str, segment: Segment, length: float, mass: float, at
 
 
 def _outline(bone: str, part: str, centre: float, at: Places) -> tuple[tuple[Part, ...], Vector]:
-    """Shapes of a bone about its centre of mass, and position of that in the doll, m.
+    """Shapes of a bone about its centre of mass, and the position of that centre in the doll, m.
 
-    ``centre``: distance of the centre of mass from the segment's proximal end, of a foot from the
+    ``centre``: distance of the centre of mass from the segment's proximal end; for a foot, from the
     heel.
     """
     x, y, z = at.proximal(bone)

@@ -41,7 +41,9 @@ class Places:
             (f'{side}_{limb}', limb) for side in SIDES for limb in LIMBS]
 
     def proximal(self, bone: str) -> tuple[float, float, float]:
-        """Proximal end of a bone, from which its centre is measured; of a foot the ankle."""
+        """Proximal end of a bone, from which its centre is measured; for a foot, whose centre is
+        measured from the heel, the ankle.
+        """
         side, _, limb = bone.partition('_')
         length = self.lengths
         if bone in UNPAIRED:

@@ -50,9 +50,9 @@ class HeldKeys:
     """Active arrow keys of a terminal, from key events without (or with) releases.
 
     A key event that comes once is a tap; a repeated key is held until shortly after its last
-    repeat. A key pressed while others push joins them, and they last as long as it does; it
-    replaces its opposite. Where releases are reported, a held key ends with its release. ``now``
-    is the time of a steady clock, s.
+    repeat. A key pressed while others push joins them, and all push until the new key ends; a key
+    replaces its opposite. Where releases are reported, a held key ends with its release. ``now`` is
+    the time of a steady clock, s.
     """
 
     def __init__(self) -> None:
@@ -90,7 +90,7 @@ class HeldKeys:
         return list(self._keys) if self.remaining(now) > 0 else []
 
     def remaining(self, now: float) -> float:
-        """Time until they stop pushing without another key event, s."""
+        """Time, s, until the keys stop pushing without another key event."""
         return max(0.0, self._until - now) if self._keys else 0.0
 
 
@@ -104,8 +104,8 @@ REPORT_TIMEOUT = 0.5
 class PressedKeys:
     """Active arrow keys of a keyboard that reports repeatedly which keys are down.
 
-    A key pushes for a tap when it goes down, and from HOLD_DELAY later until its release. ``now``
-    is the time of a steady clock, s.
+    A key pushes for the duration of a tap (TAP) when it goes down, and again from HOLD_DELAY later
+    until its release. ``now`` is the time of a steady clock, s.
     """
 
     def __init__(self) -> None:

@@ -38,8 +38,8 @@ class Pacer:
         return max(0.0, self._next - now)
 
     def due(self, now: int, early: float = 0.5) -> bool:
-        """Whether a tick is due; if so, it counts as made. ``early``: the share of the period by
-        which it may be made before.
+        """Whether a tick is due; if so, it counts as made. ``early``: fraction of the period by
+        which a tick may be made before it is due.
         """
         lag = now - self._next
         if lag <= 0:

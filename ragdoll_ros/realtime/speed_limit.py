@@ -1,4 +1,4 @@
-"""Limits pushes so that they accelerate a doll to a speed, not beyond."""
+"""Limit on pushes, so that they do not accelerate a doll beyond a speed."""
 from __future__ import annotations
 
 from collections import deque
@@ -20,11 +20,11 @@ DELAY = 0.12
 
 
 class SpeedLimit:
-    """The impulse that a speed leaves.
+    """Computes the impulse that a doll still lacks to reach a speed, less pushes on their way.
 
-    ``time``: s simulated, of the newest frame. By that clock a push that was sent still takes as
-    long to show where a busy machine delays frames. ``longest``: s that a push lasts until the next
-    one replaces it. Not thread-safe.
+    ``time``: simulated time of the newest frame, s. Where a busy machine delays frames, the delay
+    until a push shows is the same in simulated time. ``longest``: longest duration of a push, s
+    simulated. Not thread-safe.
     """
 
     def __init__(self, longest: float = LONGEST) -> None:
@@ -43,7 +43,7 @@ class SpeedLimit:
         return max(0.0, mass * missing - on_the_way)
 
     def sent(self, force: np.ndarray, time: float, real_time_factor: float) -> None:
-        """Take note of the force (3,) N of a push that is sent now."""
+        """Record the force (3,) N of a push that is sent now."""
         self._recent.append((time + DELAY * real_time_factor, force * self._longest))
 
     def clear(self) -> None:

@@ -1,10 +1,11 @@
 """A doll's motion as BVH (Biovision motion capture).
 
-By convention Y up, facing +Z, left at +X, centimetres, degrees, a fixed frame time. Rest pose:
-the bind pose. Of a fitted character the joints are the bones of its file. Of other dolls the root
-is at the root bone's centre of mass; each further joint has its child's name. Channels are Z, Y, X:
-R = Rz Ry Rx in the parent's axes. A position has the root, and a bone of a file whose place in its
-parent changes, as of a foot that hangs on the hips; gaps of joints are lost.
+By convention Y up, facing +Z, left at +X, centimetres, degrees, a fixed frame time. The rest pose
+is the bind pose. The joints of a fitted character are the bones of its file. Of other dolls the
+root is at the root bone's centre of mass; each further joint has its child's name. Channels are Z,
+Y, X: R = Rz Ry Rx in the parent's axes. The root has position channels, and so has a bone of a file
+whose position in its parent changes, such as a foot that hangs on the hips. Gaps in the joints of
+other dolls are lost.
 """
 import warnings
 from collections.abc import Callable, Iterator
@@ -94,9 +95,10 @@ def _doll_joints(doll: Ragdoll, bones: Pose) -> _Joints:
 
 
 def _file_joints(skeleton: FileSkeleton, bones: Pose, name: str) -> _Joints:
-    """The bones of a doll's file, from the poses (k, b + l) of the doll's bones and links.
+    """Return the bones of a doll's file, from the poses (k, b + l) of the doll's bones and links.
 
-    Several without a parent hang on a joint of the ``name`` at the origin, as BVH has one root.
+    Several bones without a parent hang on a joint called ``name`` at the origin, as BVH has one
+    root.
     """
     order = _depth_first(skeleton.parents)
     poses = skeleton.poses(bones)

@@ -1,7 +1,7 @@
 """The skeleton of the file that a doll was fitted to, as the doll's bones carry it.
 
-Each bone of the file is fixed to a bone of the doll, or to a link of its swings, as a rider. Those
-that the doll does not simulate, such as fingers, keep so their transform relative to the bones
+Each bone of the file is fixed to a bone of the doll, or to a link of its swings, as a rider. So
+bones that the doll does not simulate, such as fingers, keep their transform relative to the bones
 around them.
 """
 from __future__ import annotations
@@ -54,7 +54,9 @@ class FileSkeleton:
 
 
 def read_file_skeleton(doll: Ragdoll) -> FileSkeleton:
-    """The skeleton of a doll's file. Raises RagdollError if they do not match, or WrongForm."""
+    """Read the skeleton of a doll's file. Raises WrongForm for a doll without one, another
+    RagdollError if the file cannot be read or does not match.
+    """
     source = read_character_file(doll)
     to_doll = file_to_doll(doll, source)
     index = {name: k for k, name in enumerate(source.bones.names)}
@@ -95,7 +97,9 @@ def carrier_poses(scene: Scene, bones: Pose, rods: np.ndarray | None) -> list[Po
 
 
 def find_file_skeleton(placement: Placement, warn: Callable[[str], None]) -> FileSkeleton | None:
-    """The skeleton of a doll's file; None, and a warning, where it can not be read."""
+    """Return the skeleton of a doll's file. None where it has none; None, and a warning, where the
+    file can not be read or does not match.
+    """
     if placement.doll.model is None or not placement.doll.riders:
         return None
     try:

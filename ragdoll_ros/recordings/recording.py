@@ -1,4 +1,5 @@
-"""Recordings: poses of a scene over time, with interpolation, rods of swings, and Y up.
+"""Recordings: poses of a scene over time, with interpolation, rods of swings, and conversion to Y
+up.
 
 glTF (2.0, 3.4) and BVH have Y up, facing +Z, left at +X: (x, y, z) there is (y, z, x) here, a
 rotation, so that quaternions' vector parts change likewise.

@@ -33,7 +33,9 @@ THRESHOLDS = (1e-12, 1e-9, 1e-6, 1e-3, 1e-2, 1e-1, 1.0)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command: 0, 1 if the replay differs from the recording, 2 if it can not be read."""
+    """Run the command. Exit code: 0, 1 if the replay differs from the recording, 2 for an error,
+    such as a file that cannot be read.
+    """
     arguments = sys.argv[1:] if arguments is None else arguments
     at = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
     options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
@@ -91,7 +93,7 @@ def pace(text: str) -> float:
 
 
 def print_summary(run: ReplayedRun) -> None:
-    """Print what the run is; warn if other versions computed it."""
+    """Print the node, scenes and number of events of a run; warn if other versions computed it."""
     scenes = ', '.join(scene.name for scene in run.scenes.values())
     print(f'{run.node}: scene {scenes or "unknown"}, {len(run.events)} events')
     for recorded in run.versions:
@@ -100,7 +102,7 @@ def print_summary(run: ReplayedRun) -> None:
 
 
 def replay(run: ReplayedRun, options: argparse.Namespace, for_ros: list[str]) -> int:
-    """Repeat a run and check it, publish and save it if asked; the exit code."""
+    """Repeat a run and check it; publish and save it if asked. Returns the exit code."""
     player, recorder = Player(run, warn), FirstSceneRecorder()
     steps = recorder.record(player.ticks()) if options.save else player.ticks()
     try:
@@ -129,13 +131,15 @@ def replay(run: ReplayedRun, options: argparse.Namespace, for_ros: list[str]) ->
 
 
 def has_only_poses(bag: Path) -> bool:
-    """Whether a recording has poses, as the page's do, and no events."""
+    """Whether a recording has poses, like recordings of the page, and no events."""
     topics = {topic.rpartition('/')[2] for topic, *_ in read_messages(bag, lambda _: None)}
     return 'poses' in topics and 'events' not in topics
 
 
 def compare(run: ReplayedRun, engine: str | None, accuracy: str | None) -> int:
-    """Repeat a run as recorded and with other settings, print the difference; the exit code."""
+    """Repeat a run as recorded and with other settings, and print the difference. Returns the exit
+    code.
+    """
     comparison = Comparison()
     one, other = Player(run, warn), Player(run, lambda _: None, engine, accuracy)
     try:

@@ -87,7 +87,7 @@ class Player:
 
     @staticmethod
     def _arguments(event: Event) -> dict:
-        """Arguments of an action: the placement of an ``add`` is a text."""
+        """Arguments of an action; the placement of an ``add``, a text in the event, is parsed."""
         if event.kind != 'add':
             return event.fields
         return {'placement': read_placement(str(event.fields.get('placement')))}

@@ -19,7 +19,7 @@ BONE_NAMES = 'bone_names'
 
 
 def publish(steps: Iterator[Simulation], pace: float, arguments: list[str]) -> int:
-    """Publish the ``steps`` at the real-time factor ``pace`` until they end; the exit code.
+    """Publish the ``steps`` at the real-time factor ``pace`` until they end. Returns the exit code.
 
     ``arguments`` are ROS's, from --ros-args on.
     """

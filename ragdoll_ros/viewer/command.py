@@ -90,10 +90,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def stop_on_signals() -> threading.Event:
-    """An event that SIGINT and SIGTERM set.
+    """Return an event that SIGINT and SIGTERM set.
 
-    A handler may interrupt the main thread while that holds the event's lock. So it only puts into
-    a queue, which is reentrant, and a thread sets the event.
+    A handler may interrupt the main thread while that thread holds the event's lock. So the handler
+    only puts into a queue, which is reentrant, and another thread sets the event.
     """
     stop, signals = threading.Event(), queue.SimpleQueue()
 
@@ -155,7 +155,7 @@ def seconds(text: str) -> float:
 
 
 def check_options(options: argparse.Namespace, for_ros: list[str]) -> None:
-    """Raise CannotServe for options that exclude each other."""
+    """Raise CannotServe for options that exclude each other, or lack one that they require."""
     chosen = next((f'--{key}' for key in ('scene', 'play')
                    if getattr(options, key) is not None), '')
     if options.static is not None and (not chosen or for_ros):
@@ -247,7 +247,9 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
 
 
 def start_when_visible(options: argparse.Namespace, source: Source) -> StartWhenVisible | None:
-    """What resumes a scene simulated here, or a paused node, once a page shows it."""
+    """Return what resumes a scene simulated here, which is paused, or a paused node, once a page
+    shows it; None without --scene and --start-after.
+    """
     from .start_when_visible import StartWhenVisible
     if options.scene is not None:
         source.pause(True)
@@ -274,10 +276,10 @@ def free_port(host: str, requested: int | None) -> int:
 
 @contextlib.contextmanager
 def server_at(host: str, port: int) -> Iterator[object]:
-    """Viser's server, without its output.
+    """Yield viser's server, without its output.
 
-    It would take 6 s to close each connection without a request, such as a browser keeps in
-    reserve, so it is not waited for longer than STOP_TIMEOUT, and not at the interpreter's exit.
+    Viser takes 6 s to close each connection without a request, such as a browser keeps in reserve.
+    So it gets STOP_TIMEOUT to stop, and is not stopped at the interpreter's exit.
     """
     import viser
     with contextlib.redirect_stdout(io.StringIO()):

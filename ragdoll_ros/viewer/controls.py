@@ -89,8 +89,8 @@ class Controls:
     def show_scene(self, name: str) -> None:
         """Show the name of the scene.
 
-        It is set in viser's thread, where `_on_scene` reads it: set from another one, it could
-        overwrite a choice that arrives at this moment before that is read.
+        The name is set in viser's thread, where `_on_scene` reads it. Set in another thread, it
+        could overwrite a user's choice that has arrived but has not been read.
         """
         self._shown_scene = shown = name if name in self.scene.options else OTHER
         self._loop.call_soon_threadsafe(setattr, self.scene, 'value', shown)

@@ -98,12 +98,12 @@ def figures(status: SourceStatus, scene: Scene) -> str:
 
 
 def _cost_and_due(status: SourceStatus, scene: Scene) -> tuple[float, float]:
-    """What a tick costs, and how often one is due, ms."""
+    """Wall time of computing a tick, and wall time from one tick to the next, ms."""
     return 1e3 * status.tick_cost, 1e3 * scene.step / status.real_time_factor
 
 
 def _reference_energy(status: SourceStatus, scene: Scene) -> float:
-    """Energy, J, of a fall of all bones by 1 m, and the work of pushes and grabs."""
+    """Energy, J, of a fall of all bones by 1 m plus the absolute work of pushes and of grabs."""
     fall = sum(bone.mass for bone in scene.bones) * float(np.linalg.norm(scene.gravity))
     return fall + sum(abs(status.measures.get(f'work_of_{cause}_J', 0.0))
                       for cause in ('pushes', 'grabs'))
@@ -119,6 +119,6 @@ def _dot(found: Health) -> str:
 
 
 def _set_content(handle: viser.GuiHtmlHandle, text: str) -> None:
-    """Set it only if it has changed, as each assignment is sent to all pages."""
+    """Set the HTML of a widget if it has changed, as each assignment is sent to all pages."""
     if handle.content != text:
         handle.content = text

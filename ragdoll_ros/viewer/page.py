@@ -57,7 +57,10 @@ OWN_SCENES = 'Characters and scenes of your own: the tab Edit, below Files'
 
 
 class Page:
-    """What viser serves; one thread calls `update` and alone draws. ``folder``: of the files."""
+    """The page that viser serves. One thread calls `update`, and only that thread draws.
+
+    ``folder``: where the page keeps its files.
+    """
 
     def __init__(self, server: viser.ViserServer, source: Source, folder: str | Path = '.') -> None:
         self.server = server
@@ -149,7 +152,10 @@ class Page:
 
     @property
     def _requested(self) -> RequestedData:
-        """What is drawn, and the contacts of scenes with bodies: the timeline marks them."""
+        """Data that is drawn, and contacts of scenes with static bodies or robots.
+
+        The timeline marks these contacts.
+        """
         scene = self._live and self._live.scene
         has_bodies = scene is not None and bool(scene.bodies or scene.robots)
         return replace(self.display.requested,
@@ -214,7 +220,10 @@ class Page:
             pushes.motion.doll_velocity(pushes.bone))
 
     def _select(self, bone: str, add: bool) -> None:
-        """Push a bone that was clicked from now on, and edit it; ``add``: besides others."""
+        """Let pushes act on a clicked bone, and select it in the editor; ``add``: besides others.
+
+        Do nothing if clicks throw a ball.
+        """
         if self.controls.ball.takes_clicks:
             return
         self.controls.pushes.choose(bone)

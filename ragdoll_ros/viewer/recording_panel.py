@@ -29,8 +29,8 @@ SCENE_CHANGED, FULL = 'Download (scene has changed)', 'Download (recording is fu
 
 
 class RecordingPanel:
-    """Three buttons in the panel, which export parts of the ``clip``; `add` takes the frames and
-    may be called from any thread.
+    """Three buttons in the panel, which record the run, save the view, and export parts of the
+    ``clip``; `add` takes the frames and may be called from any thread.
 
     All pages share one recording; the page that stops it gets the file.
     """

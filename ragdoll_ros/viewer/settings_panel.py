@@ -143,9 +143,9 @@ def slope_of(ground: Ground) -> float:
 
 
 def sloping(ground: Ground, scene: Scene, slope: float) -> Ground:
-    """The ground at another slope, degrees, tilted about its point below the middle of all dolls.
+    """Tilt the ground to a slope, degrees, about its point below the middle of all dolls.
 
-    It falls in the direction in which it did, or towards +x. Raises OutOfRange.
+    It descends in the same direction as before, or towards +x if it was level. Raises OutOfRange.
     """
     errors.check_range('slope', slope, 0.0, MAX_SLOPE)
     if slope == slope_of(ground):

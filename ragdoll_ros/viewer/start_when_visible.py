@@ -22,8 +22,8 @@ AT_START = 0.1
 class StartWhenVisible:
     """Resumes a paused source once the first page has drawn its start.
 
-    Without a page it resumes after ``timeout`` s, or never if that is None; the first page then
-    begins again, and pages that come later do not. `update` is called repeatedly by one thread,
+    Without a page it resumes after ``timeout`` s, or never if that is None. The first page that is
+    opened then resets the source; later pages do not. `update` is called repeatedly by one thread,
     with the open pages and the time, s of a steady clock.
     """
 
@@ -43,7 +43,9 @@ class StartWhenVisible:
         return self._ran_unseen and not self.is_done and not self._is_at_start(frame)
 
     def update(self, clients: list[viser.ClientHandle], frame: Frame | None, now: float) -> None:
-        """Request an image from a page that has the start to draw, or resume the source."""
+        """Resume the source once a page has drawn its start, or after the timeout without a page.
+        Before that, reset it or request an image from a page.
+        """
         if self.is_done:
             return
         self._begin = now if self._begin is None else self._begin

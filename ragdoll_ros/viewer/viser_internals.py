@@ -31,8 +31,9 @@ _make_buffer = AsyncMessageBuffer.__init__
 
 
 class ThreadSafeEvent(asyncio.Event):
-    """An event that any thread sets, as viser does with that of a new message: asyncio's raises
-    RuntimeError where a waiter comes or goes meanwhile, which ended the viewer.
+    """An event that any thread may set, as viser does with its event of a new message.
+
+    asyncio's Event raises RuntimeError if a waiter comes or goes meanwhile; that ended the viewer.
     """
 
     def set(self) -> None:

@@ -1,4 +1,6 @@
-"""The contact parameters at which engines are compared: values that all of them represent."""
+"""The contact parameters at which engines are compared. Every engine represents them, but Drake has
+no restitution.
+"""
 import dataclasses
 from dataclasses import dataclass
 
@@ -32,7 +34,7 @@ def drop_scene(restitution: float = RESTITUTIONS[0], friction: float = FRICTION)
 
 
 def compared(trial: Trial, restitution: float = RESTITUTIONS[0]) -> Trial:
-    """The same trial with the friction of comparisons."""
+    """The same trial with the friction of comparisons and a restitution."""
     return dataclasses.replace(trial, scene=with_law(trial.scene, restitution))
 
 

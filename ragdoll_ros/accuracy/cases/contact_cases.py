@@ -52,7 +52,9 @@ def _weighted(ratio: float, *names: str) -> Trial:
 
 
 def two_dolls(speed: float) -> Trial:
-    """Two dolls that fly sideways at each other, without gravity; they collide after 0.1 s."""
+    """Two dolls that fly sideways at each other, without gravity; their first contact is at 0.1 s +
+    0.5 m / ``speed``.
+    """
     doll = load_doll('doll')
     apart = 1.2 + 0.1 * speed
     left = Placement(doll, 'left', (0.0, apart / 2, 0.0), velocity=(0.0, -0.45 * speed, 0.0))
@@ -89,7 +91,9 @@ def pile(duration: float) -> Trial:
 
 
 def _jammed() -> Trial:
-    """Limbs folded against the body, joint ranges of 1 degree, and 1000 N on the torso."""
+    """Limbs folded against the body, joint angles limited to ±1 degree, and 1000 N down on the
+    torso.
+    """
     scene = load_scene('drop')
     angles = {'left_upper_arm_2': math.radians(-60), 'right_upper_arm_2': math.radians(60),
               'left_forearm': math.radians(-110), 'right_forearm': math.radians(110)}

@@ -1,4 +1,6 @@
-"""Random scenes, reproducible: any shapes, joints, masses, materials, motions."""
+"""Random scenes, reproducible: spheres, boxes, cylinders and capsules; any joints, masses,
+materials, motions.
+"""
 import math
 
 import numpy as np
@@ -15,7 +17,7 @@ DURATION = 3.0
 
 
 def fuzzed(number: int) -> Trial:
-    """Random scene ``number``: up to three dolls of up to eight bones, thrown and pushed."""
+    """Random scene ``number``: up to three dolls of up to eight bones, all thrown, one pushed."""
     rng = np.random.default_rng([12, number])
     dolls = tuple(_placed(rng, f'doll_{k}', k) for k in range(rng.integers(1, 4)))
     material = Material(float(rng.choice((0.0, 0.1, 0.5, 1.0, math.inf))),

@@ -14,7 +14,7 @@ from .trial import HardCase, Requirements, Trial, drop, posed
 
 
 def hard_cases() -> list[HardCase]:
-    """All cases of one trial with requirements; others are in parts/hard.py."""
+    """All cases that are one trial with requirements; parts/hard.py has the others."""
     return [
         HardCase('flat and tiny bodies, inertia 1e-9', lambda: drop(_flat_and_tiny(), 0.3)),
         HardCase('start 0.2 m inside the floor', _inside_floor,
@@ -107,7 +107,9 @@ def _wrung() -> Trial:
 
 
 def _scaled(scale: float) -> Trial:
-    """The default drop of a doll ``scale`` times as large, of the same density."""
+    """A drop of the default doll at ``scale`` times its size and the same density; height, duration
+    and damping are scaled as well.
+    """
     def point(values: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(scale * value for value in values)
 
@@ -129,7 +131,7 @@ def _scaled(scale: float) -> Trial:
 
 
 def _all_sorts() -> Ragdoll:
-    """Every shape and every kind of joint."""
+    """A box, a ball, a capsule, a cylinder and a plate, with every kind of joint."""
     bones = (Bone('box', Box((0.2, 0.2, 0.3)), 5.0, (0.0, 0.0, 0.5)),
              Bone('ball', Sphere(0.1), 2.0, (0.0, 0.0, 0.8)),
              Bone('capsule', Capsule(0.05, 0.2), 1.0, (0.0, 0.3, 0.5)),

@@ -1,7 +1,8 @@
 """Nine classes of random starts of the default doll above the ground, reproducible.
 
-A start is determined by its class and number. Joint angles are drawn from the inner part of their
-ranges, so that no bones overlap; the height of the lowest point is exact.
+A start is determined by its class and number. Pushes act on the default scene. In the other classes
+joint angles are drawn from the inner part of their ranges, so that no bones overlap, but `start
+outside` then moves half of them past a limit; the height of the lowest point is exact.
 """
 import dataclasses
 import functools
@@ -68,7 +69,7 @@ def _slam(rng: np.random.Generator) -> Trial:
 
 
 def _outside(rng: np.random.Generator) -> Trial:
-    """Half of all joint angles 5 to 30 degrees past a limit."""
+    """On average half of the joint angles 5 to 30 degrees past a limit."""
     doll = drop().dolls[0].doll
     angles = inner_angles(doll, rng)
     for name, (lower, upper) in angle_limits(doll).items():
@@ -97,7 +98,9 @@ def _released(rng: np.random.Generator, fall: float, angles: dict[str, float],
 
 
 def lifted(scene: Scene, start: GeneralizedState, clearance: float) -> GeneralizedState:
-    """The same start with the lowest point of all bones ``clearance`` m above level ground."""
+    """Move ``start`` in place until the lowest point of all bones is ``clearance`` m above level
+    ground; returns it.
+    """
     doll = scene.dolls[0].doll
     state = Articulated(doll).state(start.q, start.v)
     lowest = min(height(bone, position, orientation, scene.ground)

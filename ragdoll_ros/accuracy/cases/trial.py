@@ -25,7 +25,8 @@ SINKING = 1e-3
 class Trial:
     """``duration`` s of a scene, from ``start`` or from the scene's own initial state.
 
-    Pushes have a start, begin and end with a tick, and act along the world's axes.
+    The start time of each push is given. Pushes begin and end with a tick, and act along the
+    world's axes.
     """
 
     scene: Scene
@@ -69,7 +70,9 @@ def posed(placement: Placement, angles: dict[str, float] | None = None,
 
 
 def angle_indices(doll: Ragdoll) -> dict[str, int]:
-    """Index of each joint angle after the root's coordinates, for dolls without free balls."""
+    """Index of each joint angle after the root's coordinates, for dolls without ball joints that
+    have no limits.
+    """
     names = [name for joint in doll.joints_depth_first() for name in joint.angle_names]
     return {name: place for place, name in enumerate(names)}
 
@@ -88,9 +91,9 @@ def inner_angles(doll: Ragdoll, rng: np.random.Generator) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Requirements:
-    """Bounds besides those for all cases: no NaN, no energy gain, no joint gaps, no stop.
+    """Bounds besides those for all cases: no NaN, energy gain, joint gap, stop or hanging tick.
 
-    None: no bound. Bounds in m scale with dolls larger than the default one.
+    None: no bound. Bounds of penetration scale with dolls larger than the default one.
     """
 
     sinking_m: float | None = SINKING
@@ -124,7 +127,9 @@ class HardCase:
 
 def drop(doll: Ragdoll, fall: float = 0.4, duration: float = 8.0, tick: float = 0.01,
          at: tuple[float, float] = (0.0, 0.0), **placed: object) -> Trial:
-    """A drop from rest by ``fall`` m, slightly tilted so that nothing stands by symmetry."""
+    """A drop by ``fall`` m, slightly tilted so that nothing stands by symmetry; from rest unless
+    ``placed``, fields of the Placement, has a velocity.
+    """
     scene = above_ground(doll, fall)
     _, _, up = scene.dolls[0].position
     turn = tuple(rotation.from_rpy(0.03, 0.05, 0.0))

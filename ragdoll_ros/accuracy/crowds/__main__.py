@@ -37,7 +37,9 @@ def grid(count: int, **placed: object) -> Scene:
 
 
 def turning(count: int, first: int = 0) -> Scene:
-    """``count`` dolls, each with another small spin; ``first`` numbers the first one."""
+    """``count`` dolls with different small spins, which depend on their numbers; these begin at
+    ``first``.
+    """
     level = grid(count)
     return dataclasses.replace(level, dolls=tuple(
         dataclasses.replace(doll, spin=(0.1 * math.sin(first + k), 0.1 * math.cos(first + k), 0.0))
@@ -63,7 +65,9 @@ def falling(scene: Scene, accuracy: str, workers: int = 1) -> tuple[float, float
 
 
 def falls() -> None:
-    """Print the cost per doll of crowds; smaller crowds are parts of the SAMPLED dolls."""
+    """Print the cost per doll of crowds. Of crowds below SAMPLED dolls it is the mean of as many as
+    make SAMPLED dolls.
+    """
     print(f'us per doll and tick of 10 ms over {FALL:g} s of a fall; "real time": number of dolls '
           'whose tick takes 10 ms')
     print(f'{"":22}{"CPU":>10}{"over one":>10}{"2 workers":>12}{"wall ratio":>12}{"real time":>12}')
@@ -79,7 +83,9 @@ def falls() -> None:
 
 
 def sleepers() -> None:
-    """Print the cost of sleeping dolls, and which dolls a push wakes."""
+    """Print the cost of sleeping dolls, set-up time, peak memory, and how many dolls a
+    push moves.
+    """
     print('\nasleep: us per tick of all dolls; set-up, s; peak memory of the process, MB')
     for count in CROWD_SIZES:
         begin = time.perf_counter()

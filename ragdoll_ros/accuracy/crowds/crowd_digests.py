@@ -35,7 +35,9 @@ def sixty() -> Scene:
 
 
 def run(simulation: Simulation, ticks: int, seen: Counter | None = None) -> tuple[str, str]:
-    """Digests of all states of the scene and of its first doll, from the start."""
+    """Digests of all states of the scene and of its first doll, from the start. If given, ``seen``
+    counts dolls in clusters, and how often dolls fell asleep and woke.
+    """
     scene, crowd, first = simulation.scene, hashlib.sha256(), hashlib.sha256()
     engine, pushes = simulation._engine, PUSHES if len(scene.dolls) > 1 else {}
     for tick in range(ticks):
@@ -55,7 +57,9 @@ def run(simulation: Simulation, ticks: int, seen: Counter | None = None) -> tupl
 
 def of_workers(workers: int, ticks: int = TICKS, rounds: int = 1,
                seen: Counter | None = None) -> list[tuple[str, str]]:
-    """Results of run() with some workers, again after each reset."""
+    """Results of run() with some workers: one for each of the ``rounds``, with a reset between
+    them.
+    """
     found = []
     with Simulation(sixty(), engine='rigid', workers=workers) as simulation:
         for _ in range(rounds):
@@ -73,7 +77,9 @@ def of_first_alone(ticks: int = TICKS) -> str:
 
 
 def digests() -> None:
-    """Print digests with one, two and three workers, after a reset, of another process, alone."""
+    """Print digests with one, two and three workers, after a reset and of another process, and of
+    the first doll alone.
+    """
     seen = Counter()
     (crowd, first), again = of_workers(1, rounds=2, seen=seen)
     print(f'\nSHA-256 of {TICKS} ticks of {len(sixty().dolls)} dolls; at most '

@@ -51,7 +51,9 @@ class BoneDepth:
         return found
 
     def deepest(self, trajectory: Trajectory) -> float:
-        """Largest depth of any pair, m, after its first separation."""
+        """Largest depth of any pair, m; a pair that overlaps at the start counts once it has
+        separated.
+        """
         return _deepest(self._over_time(trajectory))
 
     def after_separation(self, trajectory: Trajectory) -> tuple[Trajectory, float]:
@@ -75,6 +77,8 @@ class BoneDepth:
 
 
 def _deepest(found: np.ndarray) -> float:
-    """Largest of depths (t, pairs), m, of each pair after its first separation."""
+    """Largest of depths (t, pairs), m; a pair that overlaps at the start counts once it has
+    separated.
+    """
     counts = np.maximum.accumulate(found <= SEPARATED, axis=0)
     return float(found[counts].max(initial=0.0))

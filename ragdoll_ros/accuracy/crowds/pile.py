@@ -38,7 +38,7 @@ MAX_SPEED = 100.0
 
 
 class RungeKutta(MujocoEngine):
-    """MuJoCo with its integrator of order 4, by which fewer limbs spin up."""
+    """MuJoCo with its Runge-Kutta integrator of order 4, with which fewer limbs spin up."""
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         super().__init__(scene, accuracy, 'rk4', workers=workers)
@@ -86,7 +86,9 @@ HEAD = (f'{"ms a tick, depths in mm":30}{"CPU":>9}{"mean":>9}{"worst":>9}{"p99":
 
 def measured(scene: Scene, depths: BoneDepth, advance: Callable[[], State],
              overshoot: Callable[[], float]) -> Outcome:
-    """Advance a scene for DURATION by ``advance``, a tick each; ``overshoot`` returns rad."""
+    """Simulate a scene for DURATION and measure it: ``advance`` advances by a tick, ``overshoot``
+    returns the largest limit overshoot, rad.
+    """
     outcome, heights = Outcome(), GroundHeights(scene)
     try:
         for tick in range(round(DURATION / scene.step)):

@@ -112,7 +112,7 @@ def gentle_flight() -> ReferenceMotion:
 
 
 def long_flight() -> ReferenceMotion:
-    """The same for 2 s without limits."""
+    """As gentle_flight(), for 2 s and without joint limits."""
     return _without_limits('flight_long', 'The doll in gentle flight, 2 s, limits off', 2.0,
                            speed=1.0, seed=1, **GENTLE)
 

@@ -24,7 +24,9 @@ def jobs(options: RunOptions) -> list[Job]:
 
 
 def measure_all(repeats: int) -> list[Row]:
-    """Median tick of each scene at `normal`; each tick counts with its least cost of all runs."""
+    """Median and 99th percentile of a tick of each scene at `normal`; each tick counts with its
+    least cost of all runs.
+    """
     rounds = [[make() for _, make in SCENES] for _ in range(repeats)]
     rows = []
     for (text, _), costs in zip(SCENES, zip(*rounds, strict=True), strict=True):
@@ -52,7 +54,7 @@ def _scene(**changes: object) -> Scene:
 
 
 def _lying() -> np.ndarray:
-    """At rest on the ground, with sleep disabled."""
+    """Tick costs at rest on the ground, with sleep disabled."""
     normal = Simulation(_scene())
     awake = dataclasses.replace(normal.accuracy, sleep=False)
     normal.close()
@@ -60,7 +62,7 @@ def _lying() -> np.ndarray:
 
 
 def _flight(**changes: object) -> np.ndarray:
-    """At a height of 100 m, in a changed scene."""
+    """Tick costs at a height of 100 m, in a scene with ``changes``."""
     scene = _scene(**changes)
     placement = dataclasses.replace(scene.dolls[0], position=(0.0, 0.0, 100.0), spin=(0.3, 0, 0.5))
     return _ticks(Simulation(dataclasses.replace(scene, dolls=(placement,))))

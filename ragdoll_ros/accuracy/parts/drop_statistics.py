@@ -97,7 +97,9 @@ def measure(population: str, name: str, first: int, end: int) -> list[Row]:
 
 
 def quantities(trial: Trial, trajectory: Trajectory) -> dict[str, float]:
-    """Relative energies, slide of the centre of mass, settling time, RMS distance of the bones."""
+    """Relative energies, slide of the centre of mass, settling time, RMS distance of the bones from
+    their mean at the end.
+    """
     metrics = Metrics(trial.scene)
     masses = np.array([bone.mass for bone in trial.scene.bones])
     energy = metrics.energy(trajectory)

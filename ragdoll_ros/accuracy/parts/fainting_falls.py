@@ -91,7 +91,9 @@ def measure(first: int, end: int) -> list[Row]:
 
 
 def fall_values(start: FaintingStart) -> dict[str, float]:
-    """Vertical speeds at impact, m/s, and descent time, s; NaN for parts that do not hit."""
+    """Vertical speeds at impact, m/s, descent time, s, and direction of the lean, rad; NaN for
+    parts that do not hit.
+    """
     states, touching = simulate(start)
     phases = find_phases(start.scene, states, touching, FEET, round(ONSET_DURATION / STEP))
     frames, velocities = bone_impacts(states, touching)
@@ -154,7 +156,9 @@ def joined(rows: list[Row]) -> dict[str, np.ndarray]:
 
 
 def falls_tables(rows: list[Row]) -> list[str]:
-    """Means and shares that hit, with those of real falls; differences in their deviations."""
+    """Tables of means, and of shares of falls in which a part hits the ground, beside real falls;
+    differences in standard deviations of these.
+    """
     values = joined(rows)
     count = len(values['descent'])
 

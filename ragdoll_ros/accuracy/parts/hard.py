@@ -164,4 +164,4 @@ def _wakes_by_contact(accuracy: str) -> bool:
         for _ in range(900):
             simulation.advance()
             asleep.append(bool(simulation._engine.sleeping[0]))
-    return asleep[700] and not all(asleep)
+    return asleep[700] and not all(asleep[700:])

@@ -69,8 +69,8 @@ def measure_all(motion_name: str) -> list[Row]:
 def slope(ticks: tuple[float, ...], errors: list[float], floor: float) -> dict[str, object]:
     """Order by least squares on the logarithms of the errors in the asymptotic range.
 
-    From the coarsest tick down to the first error at the floor; needs three points. Also the slope
-    between the two finest ticks.
+    That range holds the errors below CEILING, from the coarsest tick down to the first error at
+    ``floor``; it needs three points. Also the slope between its two finest ticks.
     """
     usable = [(tick, error) for tick, error in zip(ticks, errors, strict=True)
               if math.isfinite(error) and error < CEILING]

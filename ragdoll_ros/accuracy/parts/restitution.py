@@ -45,7 +45,9 @@ def jobs(options: RunOptions) -> list[Job]:
 
 
 def measure(name: str, bodies: tuple[str, ...], restitutions: tuple[float, ...]) -> list[Row]:
-    """Largest error of the apex heights, and measured restitution, for each body."""
+    """Largest error of the apex heights, and measured restitution, for each body and
+    restitution.
+    """
     method, rows = by_name(name), []
     for body, restitution in itertools.product(bodies, restitutions):
         flights = impact_times(restitution)

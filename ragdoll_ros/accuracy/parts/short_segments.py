@@ -1,12 +1,12 @@
-"""Short segments of drops of the default doll, each restarted from an instant of a reference run.
+"""Short segments of drops of the default doll, each restarted from an instant of a run at `exact`.
 
 Impacts are chaotic, so a long run says little about a method. After Erez, Tassa and Todorov (ICRA
 2015): take many instants of a trajectory, run each method for 0.1 s from there, and compare with a
 reference from the same state. They compared each engine with itself; here the error is against one
 reference for all, and self-convergence and joint gaps are given in addition.
 
-Segments of one drop share its impacts: the errors of sixty from a single drop have a 90th
-percentile that differs by a factor of three between drops. So few are taken from each of many.
+Segments of one drop share its impacts: from one drop to another, the 90th percentile of sixty
+errors differs by a factor of three. So a few are taken from each of many drops.
 """
 import dataclasses
 import functools
@@ -100,7 +100,7 @@ def drop_states(scene: Scene, drop: int) -> list[GeneralizedState]:
 
 
 def copied(coordinates: GeneralizedState) -> GeneralizedState:
-    """Coordinates that a simulation does not change any more."""
+    """A copy of coordinates, which later steps of the simulation do not change."""
     return GeneralizedState(coordinates.q.copy(), coordinates.v.copy())
 
 
@@ -147,7 +147,7 @@ def measure(name: str, drops: int, law: Law) -> list[Row]:
 
 
 def standard_errors(errors: np.ndarray) -> tuple[float, float]:
-    """Standard errors of median and 90th percentile: bootstrap over drops, as whole."""
+    """Standard errors of median and 90th percentile, by a bootstrap that draws whole drops."""
     by_drop = errors.reshape(-1, SEGMENTS_PER_DROP)
     chosen = np.random.default_rng(0).integers(0, len(by_drop), (RESAMPLES, len(by_drop)))
     drawn = by_drop[chosen].reshape(RESAMPLES, -1)

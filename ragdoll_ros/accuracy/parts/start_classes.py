@@ -84,7 +84,9 @@ def measure_class(class_name: str, method_name: str, first: int, end: int) -> li
 
 
 def compare_class(class_name: str, method_name: str, first: int, end: int) -> list[Row]:
-    """The same at the friction of comparisons, without the rest."""
+    """Worst figures of starts first ... end - 1 at the friction of comparisons, not followed to
+    rest.
+    """
     method, found = by_name(method_name), []
     for number in range(first, end):
         start = compared(trial(class_name, number))
@@ -106,7 +108,9 @@ def restless(result: Result) -> bool:
 
 
 def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
-    """Worst figures of a trajectory, most of them after the recovery of limits and overlaps."""
+    """Worst figures of a trajectory; energy gain, overshoot and bone penetration after the recovery
+    of limits and overlaps.
+    """
     if not trajectory.finite:
         return dict.fromkeys(WORST, math.inf) | {'settled_s': math.inf}
     metrics = Metrics(start.scene)
@@ -121,7 +125,9 @@ def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
 
 
 def gathered(class_name: str, method: str, found: list[Row]) -> Row:
-    """Aggregate rows of single starts: the worst of each figure and the number of its start."""
+    """Aggregate rows of single starts: the worst of each figure, sums, and the number of the start
+    with the largest energy gain.
+    """
     worst = max(found, key=lambda row: row['excess'])
     return {'class': class_name, 'method': method, 'starts': len(found),
             'bad': sum(not row['excess'] <= EXCESS for row in found),

@@ -40,7 +40,9 @@ def jobs(options: RunOptions) -> list[Job]:
 
 
 def measure() -> list[Row]:
-    """Largest error over 3 s of each kind, and the period of VRM's spring, at each frame rate."""
+    """Largest error over 3 s and CPU time of a frame for each kind, and the period of VRM's spring,
+    at each frame rate.
+    """
     rows = []
     for rate in RATES:
         times = np.arange(1, round(DURATION * rate) + 1) / rate

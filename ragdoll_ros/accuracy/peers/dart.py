@@ -15,7 +15,9 @@ go 300 m."""
 
 
 class Dart:
-    """A trial in DART with ``substeps`` steps per tick; raises OutOfRange for other shapes."""
+    """A trial in DART with ``substeps`` steps per tick; raises OutOfRange for other shapes and
+    joints.
+    """
 
     def __init__(self, trial: Trial, substeps: int) -> None:
         import dartpy
@@ -81,7 +83,7 @@ class Dart:
         self._fill(body, bone)
 
     def _add_child(self, joint: Joint) -> None:
-        """Add the child of a joint, whose frame has the doll's axes in the bind pose."""
+        """Add the child of a joint; the joint's frame has the doll's axes in the bind pose."""
         doll = self._trial.scene.dolls[0].doll
         parent, child = doll.bone(joint.parent), doll.bone(joint.child)
         create = {'hinge': self._skeleton.createRevoluteJointAndBodyNodePair,

@@ -121,7 +121,9 @@ class Drake:
             self._plants.CoulombFriction(friction, friction))
 
     def _filter_collisions(self, scene: Scene) -> None:
-        """Disable collision within the doll, or of its excluded pairs alone."""
+        """Disable collision between all bones, or with self-collision between excluded
+        pairs alone.
+        """
         pairs = (scene.dolls[0].doll.excluded_pairs if scene.self_collision
                  else [tuple(self._bodies)])
         for names in pairs:

@@ -7,10 +7,10 @@ from ..cases.trial import Trial
 
 
 class FixedSteps:
-    """A trial with ``substeps`` equal steps per tick by the library of an engine.
+    """A trial with at least ``substeps`` equal steps per tick by the library of an engine.
 
-    The engine translates the scene and reads states; its energy account and its correction of
-    energy and momentum are not used.
+    There are more where explicit damping would be unstable. The engine translates the scene and
+    reads states; its energy account and its correction of energy and momentum are not used.
     """
 
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., SubsteppedEngine]) -> None:

@@ -50,7 +50,8 @@ def ball_slide_then_roll(speed: float, friction: float, gravity: float, t: np.nd
                          rim: float = 0.0) -> np.ndarray:
     """Distance, m, of a solid ball on the ground with initial speed and ``rim`` = r w, m/s.
 
-    It slides with -mu g until 2 (v0 - r w0) / (7 mu g), then rolls at constant speed.
+    It slides at the acceleration -mu g until t = 2 (v0 - r w0) / (7 mu g), then rolls at constant
+    speed.
     """
     t = np.asarray(t, float)
     grip = 2 * (speed - rim) / (7 * friction * gravity)
@@ -62,7 +63,9 @@ def ball_slide_then_roll(speed: float, friction: float, gravity: float, t: np.nd
 
 def ball_slide_then_roll_angle(speed: float, friction: float, gravity: float, radius: float,
                                t: np.ndarray, rim: float = 0.0) -> np.ndarray:
-    """Rotation, rad, of the same ball: accelerated by 5/2 mu g / r until it rolls, then v / r."""
+    """Rotation, rad, of the same ball: angular acceleration 5/2 mu g / r until it rolls, then rate
+    v / r.
+    """
     t = np.asarray(t, float)
     grip = 2 * (speed - rim) / (7 * friction * gravity)
     slid, rolled = np.minimum(t, grip), np.maximum(t - grip, 0.0)
@@ -74,8 +77,8 @@ def friction_factors(ratio: float) -> tuple[float, float]:
     """Friction of a thin disc that slides and spins on its face, with uniform pressure.
 
     Coulomb's law; force over mu m g, and torque over mu m g r, at a = v / (r w) = ``ratio``. The
-    mean of |v + w x p| over the face is r w W(a), the mean distance of the face's points from one
-    at a radii from its centre:
+    mean of |v + w x p| over the face is r w W(a). W is the mean distance, in radii, of the face's
+    points from one at a radii from its centre:
 
         W = 4/(9 pi) [(7 + a^2) E - 4 (1 - a^2) K](a^2),                       a <= 1
         W = 4/(9 pi) [a (7 + a^2) E - (a^2 - 1) (a^2 + 3) / a K](1/a^2),       a >= 1

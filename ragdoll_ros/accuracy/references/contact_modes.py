@@ -6,8 +6,9 @@ tangential response
     w = G (n, t) + b,
 
 G the Delassus matrix, w accelerations or velocities after an impact. A contact is open (no force,
-w_n >= 0) or closed (w_n = 0, n >= 0), and closed it sticks (w_t = 0, |t| <= mu n) or slides towards
-s (t = -s mu n, s w_t >= 0). Moreau's law: sliding is determined by the velocity afterwards.
+w_n >= 0) or closed (w_n = 0, n >= 0). A closed contact sticks (w_t = 0, |t| <= mu n) or slides in
+the direction s (t = -s mu n, s w_t >= 0). Moreau's law: sliding is determined by the velocity
+afterwards.
 """
 import itertools
 from collections.abc import Sequence
@@ -55,7 +56,8 @@ def constrained_motion(mass: np.ndarray, force: np.ndarray, jacobian: np.ndarray
                        modes: Sequence[str], friction: float) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (nv,) with fixed modes, and forces (k, 2) of all contacts.
 
-    ``force`` (nv,): generalized; ``drift`` (k, 2): accelerations of the contacts at none of these.
+    ``force`` (nv,): generalized; ``drift`` (k, 2): accelerations of the contacts where the
+    generalized ones are zero.
     """
     rows, forces = rows_and_forces(jacobian, modes, friction)
     held = rows_and_forces(drift[..., None], modes, friction)[0][:, 0]
@@ -65,7 +67,9 @@ def constrained_motion(mass: np.ndarray, force: np.ndarray, jacobian: np.ndarray
 
 
 def choices(friction: float) -> tuple[str, ...]:
-    """Possible modes of a contact that does not slide yet; without friction one sliding mode."""
+    """Possible modes of a contact that does not slide yet; without friction open or one sliding
+    mode.
+    """
     return MODES if friction > 0 else (OPEN, FORWARD)
 
 

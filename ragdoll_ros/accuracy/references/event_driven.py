@@ -1,8 +1,8 @@
 """Event-driven integration of planar rods with feet: contact events located, impacts solved.
 
 Between events DOP853 at 1e-12 with fixed contact modes (contact_modes.py). Events are a touch-down,
-a lift-off, the begin and the end of sliding. At a touch-down all closed feet obey Newton's law,
-w_n = -e w_n before, and Moreau's friction law.
+a lift-off, the begin and the end of sliding. At a touch-down all closed feet obey Newton's law, by
+which w_n becomes -e times itself, and Moreau's friction law.
 """
 from collections.abc import Callable, Iterator
 
@@ -140,7 +140,9 @@ def _until_event(figure: PlanarRods, begin: float, end: float, y: np.ndarray,
 
 def _events(figure: PlanarRods, foot: int, mode: str, modes: tuple[str, ...],
             ) -> Iterator[tuple[Event, tuple[str, ...]]]:
-    """Events that end a foot's mode, functions that fall through 0, and the modes afterwards."""
+    """Yield the events that end a foot's mode, as functions that fall through 0, each with the
+    possible modes afterwards.
+    """
     def gap(_: float, y: np.ndarray) -> float:
         return figure.gaps(y)[foot] + TOUCH
 

@@ -119,7 +119,8 @@ def spin_down(radius: float, friction: float, gravity: float, rate: float,
               times: np.ndarray) -> np.ndarray:
     """Angles (t,) rad of a disc that spins on its face until friction stops it.
 
-    With uniform pressure the torque is 2/3 mu m g r, the moment m r^2 / 2, so w' = -4/3 mu g / r.
+    With uniform pressure the torque is 2/3 mu m g r, the moment of inertia m r^2 / 2, so w' = -4/3
+    mu g / r.
     """
     slowing = 4 / 3 * friction * gravity / radius
     t = np.minimum(times, rate / slowing)

@@ -1,10 +1,10 @@
 """A chain of equal rods in a plane, from Lagrange's equations in absolute angles.
 
-With x the place of the first rod's centre and phi_i the angle of rod i to the x axis, centre i
-lies at x + sum_k a_ik L (cos phi_k, sin phi_k), a_ik = 1/2 at both ends of the row and 1 between.
-Then T = m/2 sum |x_i'|^2 + I/2 sum phi_i'^2 gives
+With x the place of the first rod's centre and phi_i the angle of rod i to the x axis, centre i lies
+at x + sum_k a_ik L u_k, u_k = (cos phi_k, sin phi_k), a_ik = 1/2 at both ends of the row and 1
+between. Then T = m/2 sum |x_i'|^2 + I/2 sum phi_i'^2 gives, with J_i the Jacobian of centre i,
 
-    M(phi) [x'', phi''] = Q + [c, s] phi'^2,
+    M(phi) [x'', phi''] = sum_i m J_i' (g + sum_k a_ik L u_k phi_k'^2),
 
 integrated by DOP853 at 1e-12. Shares no code with the engines.
 """

@@ -26,8 +26,9 @@ def directions(phi: np.ndarray) -> np.ndarray:
 class PlanarRods:
     """Rods of ``lengths`` m, ``masses`` kg, ``inertias`` kg m^2, ball ends of ``radii`` m.
 
-    Rod i > 0 hangs by its upper end (+) from rod ``parents[i]``, at that one's upper or lower end
-    (``sides[i]``, 1 or -1). ``feet`` lists the ends (rod, 1 or -1) that may touch the ground.
+    Rod i > 0 hangs by its upper end (+) from its parent, rod ``parents[i]``, at the parent's upper
+    or lower end (``sides[i]``, 1 or -1). ``feet`` lists the ends (rod, 1 or -1) that may touch the
+    ground.
     """
 
     lengths: tuple[float, ...]
@@ -75,7 +76,7 @@ class PlanarRods:
 
     @cached_property
     def _feet_arms(self) -> np.ndarray:
-        """The same (k, n) of the feet."""
+        """Offsets (k, n), m, of the k feet along each rod, from the root's centre."""
         arms = self._arms[[rod for rod, _ in self.feet]]
         for row, (rod, end) in zip(arms, self.feet, strict=True):
             row[rod] += end * self.lengths[rod] / 2
@@ -103,7 +104,8 @@ class PlanarRods:
     def contact(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Jacobian (k, 2, n + 2) of the feet's normals and tangents, and their drift (k, 2).
 
-        A ball touches its radius below its centre, so its point moves with -r phi' besides.
+        The contact point of a ball is a radius r below its centre, which adds -r phi' to the
+        tangential velocity.
         """
         n = len(self.lengths)
         phi, rates, arms = y[2:2 + n], y[4 + n:], self._feet_arms

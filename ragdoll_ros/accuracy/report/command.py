@@ -87,7 +87,9 @@ def parser() -> argparse.ArgumentParser:
 
 
 def report(options: argparse.Namespace) -> int:
-    """Run the jobs unless --from-json is given, then write; 0."""
+    """Run the jobs unless --from-json is given, then write; returns 0. ``--case list`` only prints
+    the names.
+    """
     if options.case == ['list']:
         sys.stdout.write('\n'.join(labels()) + '\n')
         return 0

@@ -258,7 +258,7 @@ def _work_precision(axes: Axes, rows: Sequence[Row], error_key: str) -> None:
 
 
 def _name_settings(axes: Axes, rows: Sequence[Row], error_key: str) -> None:
-    """Label the accuracies' points; points of equal height share one label."""
+    """Label the accuracies' points; neighbours of nearly equal height share one label."""
     low, high = np.log10(axes.get_ylim())
     groups: list[list[tuple[float, float, str]]] = []
     for row in rows:

@@ -31,7 +31,9 @@ def motion_tables(rows: list[Row]) -> list[str]:
 
 
 def ratio_table(rows: list[Row]) -> list[str]:
-    """CPU times over those of the first method, by class and in total, and the share of reading."""
+    """CPU times over those of the first method, by class and in total, and the times of reading
+    over the same total.
+    """
     methods = list(dict.fromkeys(row['method'] for row in rows))
     lines = [{'class': name, **{row['method']: row['ratio'] for row in rows
                                 if row['class'] == name}}

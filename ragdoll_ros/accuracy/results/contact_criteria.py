@@ -68,7 +68,9 @@ def _segments(figures: Figures) -> Iterator[Row]:
 
 
 def _segment(row: Row, accuracy: str, base: float | None) -> Iterator[Row]:
-    """Errors, and CPU time over ``base``, s per s, if there is one."""
+    """Yield criteria of a row's errors and, if there is a ``base``, s per s, of its CPU time over
+    it.
+    """
     median, most, ratio = SEGMENTS[accuracy]
     name = f'{_law(row)}, {accuracy}'
     found = 1e3 * number(row['position_median_m']), 1e3 * number(row['position_p90_m'])
@@ -97,7 +99,9 @@ def _law(row: Row) -> str:
 
 
 def _not_dominated(figures: Figures) -> Iterator[Row]:
-    """Errors against each engine's own limit, which favours the others."""
+    """Yield criteria: no engine is faster than ours and closer to its own finest run, which favours
+    the others.
+    """
     others = [row for row in sound(figures.get('pieces', ()))
               if row['family'] != 'ours' and 'own_median_m' in row]
     for accuracy, rows in by_setting(figures, 'pieces', lambda row: 'own_median_m' in row):

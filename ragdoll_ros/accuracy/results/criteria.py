@@ -71,7 +71,7 @@ def criteria(figures: Figures) -> list[Row]:
 
 
 def _largest(bound: Bound, figures: Figures) -> Iterator[Row]:
-    """NaN meets no bound."""
+    """Yield the criterion of a bound at each accuracy; NaN meets no bound."""
     for accuracy, rows in by_setting(figures, bound.part, bound.keep):
         if accuracy not in bound.most:
             continue

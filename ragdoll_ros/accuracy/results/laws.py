@@ -10,7 +10,9 @@ LAWS = {
               'm/s; limits and penetration are corrected over 10 ms, so that limits are passed by '
               'degrees',
     'mujoco': 'MuJoCo: contacts and joint limits are springs with dampers, with time constants of '
-              '4 and 2 steps; restitution follows from their damping, none is critical damping',
+              '4 and 2 steps at critical damping, which is no restitution; restitution is less '
+              'damping at the same frequency; what these springs store counts as lost and, when '
+              'they give it back, as energy excess',
     'dart': 'DART: rigid contacts and limits; friction is a pyramid, up to 41 % more in its '
             'diagonals; no restitution below 0.1 m/s',
     'drake': 'Drake: SAP with compliant contacts, one point for each pair of bodies; no '
@@ -46,7 +48,7 @@ def law_note(rows: Iterable[Row]) -> str:
 
 
 def motion_law_note(rows: Iterable[Row]) -> str:
-    """The same for motions whose friction every engine represents."""
+    """As law_note(), for motions whose friction every engine represents."""
     differing = _differing(sound(rows))
     return f'All methods have the parameters in the titles. {differing}' if differing else ''
 

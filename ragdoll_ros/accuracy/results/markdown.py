@@ -26,7 +26,7 @@ def table(rows: Iterable[Row], columns: Sequence[Column]) -> str:
 
 
 def present(rows: Sequence[Row], columns: Iterable[Column]) -> list[Column]:
-    """Columns that some row has a figure for; those of older versions lack some."""
+    """Columns that some row has a figure for; rows of older versions lack some."""
     return [column for column in columns if any(column[0] in row for row in rows)]
 
 

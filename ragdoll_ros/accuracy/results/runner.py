@@ -75,7 +75,9 @@ def attempt(job: Job) -> list[Row]:
 
 
 def prepare() -> None:
-    """Silence warnings about diverging runs and friction, which show in figures and notes."""
+    """Silence warnings about diverging runs and friction, which show in figures and notes, and
+    change to the directory for temporary files.
+    """
     silence_warnings()
     warnings.simplefilter('ignore', FrictionWarning)
     os.chdir(tempfile.gettempdir())

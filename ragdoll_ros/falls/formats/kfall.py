@@ -2,8 +2,8 @@
 10.3389/fnagi.2021.692865): per fall a file with the samples of the recipe's first IMU, per shard a
 table of labels.
 
-Columns: time s, frame, acceleration g, rate deg/s, Euler angles deg (roll, pitch and yaw of the
-sensor in the world). A shard stands for a subject, a fall for a trial of its task. Labels are
+Columns: time s, sample number, acceleration g, rate deg/s, Euler angles deg (roll, pitch and yaw of
+the sensor in the world). A shard stands for a subject, a fall for a trial of its task. Labels are
 sample numbers of Phases.onset and Phases.impact, the first contact. The sensor's axes are the
 recipe's.
 """

@@ -2,13 +2,13 @@
 
 The layout, not the code, of https://github.com/huggingface/lerobot (Apache-2.0): meta/info.json,
 meta/stats.json, meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet and
-data/chunk-000/file-000.parquet. Numbers are float32. All falls have equally many frames, so the
-indices of a shard follow from its number.
+data/chunk-000/file-000.parquet. Recorded real numbers are float32, those of labels float64. All
+falls have equally many frames, so the indices of a shard follow from its number.
 
 Labels in meta/episodes: onset, impact (first contact) and rest are the frames of Phases;
-impact_frames and impact_speeds (m/s downwards) are those of each bone's first contact. Of impacts:
-region, other side, speed, peak force and ratio of the worst, hic15, of each of the regions the
-largest, and of each contact its time, bone, other side, speed and energies.
+impact_frames and impact_speeds (m/s downwards) are those of each bone's first contact. Of the worst
+impact: region, other side, speed, peak force and ratio. Of the head: hic15. Of each region: largest
+peak force and ratio. Of each contact: time, bone, other side, speed and energies.
 """
 import io
 import json
@@ -91,8 +91,8 @@ def read_regions(folder: Path) -> list[str]:
 
 
 def read_forces(folder: Path, recipe: Recipe, imu: str) -> Iterator[np.ndarray]:
-    """Specific force (s, 3) m/s^2 that a sensor reads in each fall of a data set, in its axes, the
-    first sample at the start.
+    """Yield, for each fall of a data set, the specific force (s, 3) m/s^2 that a sensor reads, in
+    the sensor's axes; the first sample is that at the start.
     """
     for path in sorted(folder.glob('data/*/*.parquet')):
         table = parquet.read_table(path, columns=[f'observation.imu.{imu}'])
@@ -147,7 +147,7 @@ def _each(bones: tuple[str, ...], parts: tuple[str, ...]) -> list[str]:
 
 
 def _sample_names(recipe: Recipe) -> tuple[str, ...]:
-    """Names of a sensor's numbers in a frame, numbered if it has several samples."""
+    """Names of a sensor's numbers in a frame, with the sample's number if a frame has several."""
     if recipe.samples_per_frame == 1:
         return SAMPLE_NAMES
     return tuple(f'{name}_{sample}' for sample in range(recipe.samples_per_frame)
@@ -189,7 +189,7 @@ def _episode(recipe: Recipe, fall: Fall, place: dict[str, int]) -> dict:
 
 
 def _impacts(fall: Fall) -> dict:
-    """Columns of the worst impacts; None where there is none."""
+    """Columns of the worst impacts, None where there is none, and lists of all contacts."""
     worst, regions = fall.worst_impacts.worst, fall.worst_impacts.by_region
     hic15 = fall.worst_impacts.hic15
     return {
@@ -269,7 +269,7 @@ def _tasks(name: str) -> bytes:
 
 
 def _parquet(table: pa.Table, rows_per_group: int) -> bytes:
-    """Encode a table; the bytes depend on the table and pyarrow's version alone."""
+    """Encode a table; the bytes depend on the arguments and pyarrow's version alone."""
     stream = io.BytesIO()
     parquet.write_table(table, stream, row_group_size=rows_per_group, compression='zstd')
     return stream.getvalue()

@@ -17,7 +17,9 @@ FORMATS = {
 
 
 class Format(Protocol):
-    """Interface of a format's module; its bytes depend on falls and library versions alone."""
+    """Interface of a format's module; the bytes of the files depend on the arguments and on the
+    versions of libraries alone.
+    """
 
     def check(self, recipe: Recipe) -> None:
         """Raise an error if the format cannot hold a recipe's falls; optional."""

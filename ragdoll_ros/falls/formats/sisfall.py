@@ -1,10 +1,11 @@
 """Text in the layout of SisFall (Sucerquia, Lopez, Vargas-Bonilla, Sensors 2017,
-10.3390/s17010198): per fall a file with the samples of the recipe's first IMU, at 200 Hz.
+10.3390/s17010198): a file per fall, with samples of the recipe's first IMU, at 200 Hz.
 
 Nine integers a line, in units of the data set's chips: acceleration of an ADXL345 (16 g, 13 bits),
-rate of an ITG3200 (2000 deg/s, 16 bits), acceleration of an MMA8451Q (8 g, 14 bits), clipped there.
-Both accelerometers are the same sensor. A shard stands for a subject. SisFall has no labels; here
-each subject has a table of them, of samples. The sensor's axes are the recipe's.
+rate of an ITG3200 (2000 deg/s, 16 bits), acceleration of an MMA8451Q (8 g, 14 bits), each clipped
+to the chip's range. Both accelerometers are the same sensor. A shard stands for a subject. SisFall
+has no labels; here each subject has a table of labels, in sample numbers. The sensor's axes are the
+recipe's.
 """
 from collections import Counter
 

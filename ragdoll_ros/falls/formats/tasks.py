@@ -22,7 +22,7 @@ class TaskCode:
 
     @property
     def letter(self) -> str:
-        """F of falls, D of what is none."""
+        """'F' for a fall, 'D' for none."""
         return 'F' if self.sisfall else 'D'
 
 
@@ -56,6 +56,8 @@ def task_of(recipe: Recipe, fall: Fall) -> TaskCode:
 
 
 def description_of(recipe: Recipe, task: TaskCode) -> str:
-    """What a fall is: KFall's description of it, or that it has none."""
+    """KFall's description of a fall, or 'no fall'; a fall of a recipe without a cause has none,
+    which the text then says.
+    """
     known = 'cause' in recipe.data or task is NO_FALL
     return task.description if known else f'{recipe.name}: no task of KFall'

@@ -93,7 +93,9 @@ def _records(stream: BinaryIO, in_chunk: bool = False) -> Iterator[object]:
 
 
 def _records_of_truncated(stream: BinaryIO) -> Iterator[object]:
-    """Complete records in the truncated last record."""
+    """Yield the complete records within the truncated last record, if it is an
+    uncompressed chunk.
+    """
     from mcap.data_stream import ReadDataStream
     from mcap.exceptions import EndOfFile
     from mcap.opcode import Opcode

@@ -1,7 +1,7 @@
 """CDR encoding of std_msgs/String and geometry_msgs/PoseArray, without ROS.
 
-A header of four bytes, the second odd for little-endian; from its end numbers are aligned to their
-size.
+A message begins with a header of four bytes, whose second byte is odd for little-endian. Numbers
+are aligned to their size, counted from the end of the header.
 """
 import struct
 

@@ -67,7 +67,9 @@ def doll_roles(doll: Ragdoll) -> tuple[str | None, ...]:
 
 
 def _next_segment(limb: tuple[str, ...], above: str | None) -> str:
-    """Role that follows the parent's in a limb whose bones are numbered."""
+    """Return the role that follows the parent's role ``above`` in a limb: the first one if
+    ``above`` is not in the limb, at most the last one.
+    """
     if above not in limb:
         return limb[0]
     return limb[min(limb.index(above) + 1, len(limb) - 1)]
@@ -87,7 +89,9 @@ def _raw_role(words: tuple[str, ...]) -> str | None:
 
 
 def _distinct_words(names: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """Words of each name without the affixes shared by most: Ringmaster_LeftArm_skin."""
+    """Return the words of each name without affixes that most names share, such as Ringmaster and
+    skin in Ringmaster_LeftArm_skin.
+    """
     words = [_side_and_words(name)[1] for name in names]
     for end in (0, -1):
         while len(words) >= MIN_NAMES:

@@ -1,8 +1,9 @@
 """BVH (Biovision motion capture): a skeleton, and the channels of its joints over time.
 
 Meredith and Maddock, Motion Capture File Formats Explained (2001). Angles are in degrees, in the
-order of the file: R = R1 R2 R3, in the parent's axes. In the rest pose all are zero. A position
-channel is the place in the parent's axes in that direction; it replaces the OFFSET, as in Blender.
+order of the file: R = R1 R2 R3, in the parent's axes. In the rest pose all angles are zero. A
+position channel is the joint's coordinate along that axis of the parent; it replaces the OFFSET's,
+as in Blender.
 """
 from __future__ import annotations
 
@@ -52,7 +53,9 @@ class BvhJoint:
 
 @dataclass(frozen=True, eq=False)
 class BvhFile:
-    """Joints, parents first; frame time, s; frames (k, c), the channels of all joints."""
+    """A BVH file: its joints, parents first; ``step``, the frame time, s; and ``frames`` (k, c),
+    the channels of all joints.
+    """
 
     joints: tuple[BvhJoint, ...]
     step: float
@@ -60,12 +63,12 @@ class BvhFile:
 
     @property
     def times(self) -> np.ndarray:
-        """(k,) s, of the frames."""
+        """Times (k,) of the frames, s."""
         return self.step * np.arange(len(self.frames))
 
     @property
     def names(self) -> list[str]:
-        """Of the joints."""
+        """Names of the joints."""
         return [joint.name for joint in self.joints]
 
     @functools.cached_property
@@ -77,7 +80,9 @@ class BvhFile:
         return places
 
     def worlds(self, wanted: Iterable[int]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Places (k, 3) and orientations (k, 4) of joints in all frames, by index."""
+        """Return positions (k, 3) and orientations (k, 4) of the ``wanted`` joints and those above
+        them in all frames, in the file's axes, by index.
+        """
         needed = set()
         for index in wanted:
             while index >= 0:
@@ -97,7 +102,9 @@ class BvhFile:
 
     @staticmethod
     def _local(joint: BvhJoint, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Place (k, 3) and orientation (k, 4) in the parent's axes, of its channels (k, c)."""
+        """Return position (k, 3) and orientation (k, 4) of a joint in its parent's axes, from the
+        values (k, c) of its channels.
+        """
         place = np.tile(joint.offset, (len(values), 1))
         turn = np.tile(rotation.IDENTITY, (len(values), 1))
         for (is_angle, axis), column in zip(joint.channels, values.T, strict=True):
@@ -131,7 +138,9 @@ def _read(path: str, stamp: tuple[int, int]) -> BvhFile:
 
 
 def parse_bvh(content: bytes) -> BvhFile:
-    """The content of a file. Raises a ModelError whose path is the line."""
+    """Parse the content of a file. Raises a ModelError whose path is the line, or MOTION if no
+    frame follows.
+    """
     # Whoever may set a node's scene could read any file by an error that quotes it.
     if not re.match(rb'(\xef\xbb\xbf)?\s*HIERARCHY\b', content, re.IGNORECASE):
         raise errors.Unreadable('line 1', 'another text', 'a BVH file, which begins HIERARCHY')
@@ -158,7 +167,9 @@ def parse_bvh(content: bytes) -> BvhFile:
 
 def _head(rows: Iterator[tuple[int, str]], pattern: str, expected: str,
           last: int) -> tuple[int, float]:
-    """Line and number of a line that fits the pattern."""
+    """Return line number and value of the next line, which must match ``pattern``. Raises a
+    ModelError.
+    """
     line, text = next(rows, (last, 'the end of the file'))
     found = re.fullmatch(pattern, text.strip(), re.IGNORECASE)
     if not found:

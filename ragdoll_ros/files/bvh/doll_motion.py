@@ -1,9 +1,10 @@
-"""The motion of a doll by a file of motion capture, whose skeleton and rest pose may be others.
+"""The motion of a doll from a motion capture file, whose skeleton and rest pose may differ from the
+doll's.
 
-A body turns as its joint does, from the pose in which its limb has the direction that the joint's
-has in the rest pose: of arms that hang in the doll's bind pose and are spread in the rest pose, so
-that limbs point where those of the capture do. Places are scaled by the ratio of the legs' lengths,
-else of all edges.
+Each body turns as its joint does since the rest pose. It starts from the bind pose, turned so that
+its limb has the direction of the joint's limb in the rest pose: arms that hang in the bind pose but
+are spread in the rest pose are first spread. So limbs point in the directions of the capture.
+Positions are scaled by the ratio of the lengths of the legs, or of all edges if there are no legs.
 """
 from __future__ import annotations
 
@@ -63,7 +64,9 @@ class BvhMotion:
 
 
 def read_bvh_motion(doll: Ragdoll, path: str | Path, bones: Mapping[str, str]) -> BvhMotion:
-    """The motion of a doll by a file; ``bones`` names joints of bodies. See load_animations()."""
+    """Read the motion of a doll from a file; ``bones`` has names of joints by body. See
+    load_animations().
+    """
     file = read_bvh(str(path))
     joints = joints_of_bodies(doll, file.names, [joint.parent for joint in file.joints], bones)
     return _Retargeting(doll, file, joints).motion()
@@ -71,7 +74,9 @@ def read_bvh_motion(doll: Ragdoll, path: str | Path, bones: Mapping[str, str]) -
 
 @dataclass(frozen=True, eq=False)
 class _Retargeting:
-    """From a file to a doll: the index of the joint of each body that has one."""
+    """Transfers the motion of a file to a doll. ``joints`` has the index of the joint of each body
+    that has one.
+    """
 
     doll: Ragdoll
     file: BvhFile
@@ -102,7 +107,9 @@ class _Retargeting:
 
     @functools.cached_property
     def _parents(self) -> dict[str, str]:
-        """The next body above each that has a joint; the root has none."""
+        """For each body that has a joint, except the root, the nearest body above it that
+        has one.
+        """
         above = {joint.child: joint.parent for joint in self.doll.joints}
         found = {}
         for body in [joint.child for joint in self.doll.joints_from_root()]:
@@ -114,16 +121,19 @@ class _Retargeting:
 
     @functools.cached_property
     def _rest(self) -> dict[str, np.ndarray]:
-        """Place (3,) of each body's joint in the rest pose, of the file."""
+        """Position (3,) of each body's joint in the file's rest pose, in the file's axes
+        and units.
+        """
         return {body: self.file.rest[joint] for body, joint in self.joints.items()}
 
     def _fitted(self) -> tuple[dict[str, np.ndarray], float, np.ndarray]:
-        """Place (3,) m of each body's joint in the bind pose, metres per unit of the file, and
-        rotation matrix from the file's axes.
+        """Return the position (3,) m of each body's joint in the bind pose, the metres per unit of
+        the file, and the rotation matrix from the file's axes.
 
-        Places are those of the doll's joints, or of the riders that carry the bodies, whichever
-        have edges of lengths more like the file's. In the first case the root's is where the
-        joints below it, of a person the hips, are as in the file.
+        Positions are those of the doll's joints, or of the riders that carry the bodies, whichever
+        give edges with lengths closer to the file's. In the first case the root's joint is placed
+        so that the joints below it, those of the legs if there are any, have on average the same
+        offset from it as in the file.
         """
         anchors = {joint.child: np.array(joint.anchor) for joint in self.doll.joints}
         points = {body: anchors.get(body, np.array(self.doll.bone(body).position))
@@ -161,8 +171,8 @@ class _Retargeting:
         return ours, theirs
 
     def _edges(self) -> list[str]:
-        """Bodies above which are edges to compare: not from the root, unless there are no others,
-        as a root's joint may be anywhere in it.
+        """Return the bodies whose edge to the body above is compared. Edges from the root are left
+        out, unless there are no others, as a root's joint may be anywhere in it.
         """
         inner = [body for body, up in self._parents.items() if up != self.doll.root.name]
         return inner or list(self._parents)
@@ -183,8 +193,9 @@ class _Retargeting:
         return bool((abs(ours - self._scale(points) * theirs) <= SAME_SKELETON * ours + 1e-9).all())
 
     def _axes(self, points: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Rotation matrix from the file's axes: Y up, facing +Z, or what by quarters of a turn
-        about the vertical, or from Z up, fits the bind pose better.
+        """Return the rotation matrix from the file's axes to the doll's. Y up, facing +Z is
+        assumed, unless another direction by quarter turns about the vertical, or Z up, fits the
+        bind pose clearly better.
         """
         ours, theirs = (np.array([each[body] for body in self.joints])
                         for each in (points, self._rest))
@@ -199,10 +210,12 @@ class _Retargeting:
 
     def _alignments(self, points: Mapping[str, np.ndarray],
                     axes: np.ndarray) -> dict[str, np.ndarray]:
-        """Rotation (4,) of each body from the bind pose to where its limb is as in the rest pose.
+        """Return the rotation (4,) that turns each body from the bind pose so that its limb has the
+        direction that it has in the rest pose.
 
-        The direction of a limb is that from its joint to the middle of those below. The root is
-        upright in both.
+        A limb's direction is from its joint to the mean of the joints below it, of a last segment
+        to its end. The trunk and last segments are turned only beyond OTHER_DIRECTION. The root is
+        assumed upright in both poses.
         """
         found = {self.doll.root.name: np.array(rotation.IDENTITY)}
         for body, parent in self._parents.items():
@@ -219,15 +232,17 @@ class _Retargeting:
         return found
 
     def _end(self, joint: int) -> np.ndarray:
-        """From a joint (3,) to its End Site, or to the middle of the joints below."""
+        """Return the vector (3,) from a joint to the mean of the joints below it, else to its End
+        Site, else zero.
+        """
         below = [each.offset for each in self.file.joints if each.parent == joint]
         tip = self.file.joints[joint].tip
         return np.mean(below, axis=0) if below else np.zeros(3) if tip is None else tip
 
 
 def _aligned(turn: np.ndarray, ours: np.ndarray, theirs: np.ndarray, least: float) -> np.ndarray:
-    """The rotation ``turn`` (4,), and that by which it takes ``ours`` (3,) to the direction of
-    ``theirs`` (3,), if that is more than ``least`` rad.
+    """Return the rotation ``turn`` (4,), followed by the shortest rotation from the turned ``ours``
+    (3,) to the direction of ``theirs`` (3,) if that exceeds ``least`` rad.
     """
     if min(np.linalg.norm(ours), np.linalg.norm(theirs)) < 1e-9:
         return turn

@@ -1,7 +1,8 @@
-"""Joints of a skeleton of motion capture that move the bodies of a doll: by names, or by roles.
+"""Joints of a motion capture skeleton that move the bodies of a doll, found by names or by roles.
 
-By names if the joints have those of the doll's bodies or riders, as files that were exported from
-it do; else by the roles of both names (thigh, hand, ...), as the skeletons of persons have them.
+By names, if the root and at least half of the bodies have joints with their names or those of their
+riders, as in files that were exported from the doll. Else also by roles (thigh, hand, ...) that the
+names of joints and bodies state, as in skeletons of persons.
 """
 from __future__ import annotations
 
@@ -22,9 +23,10 @@ NEXT_ROLE = dict(zip((*ARM[:-1], *LEG[:-1]), (*ARM[1:], *LEG[1:]), strict=True))
 
 def joints_of_bodies(doll: Ragdoll, names: Sequence[str], parents: Sequence[int],
                      chosen: Mapping[str, str]) -> dict[str, int]:
-    """Index of the joint that moves each body, by its name; others have none.
+    """Return the index of the joint that moves each body, by body; the root's is 0 if none is
+    found, other bodies without a joint are left out.
 
-    ``names`` and ``parents`` are those of the joints; ``chosen`` names joints of bodies. Raises
+    ``names`` and ``parents`` are the joints'; ``chosen`` has names of joints by body. Raises
     UnknownBone or UnknownJoint for what is chosen, WrongForm if nothing fits.
     """
     found = _by_names(doll, names)
@@ -45,7 +47,9 @@ def joints_of_bodies(doll: Ragdoll, names: Sequence[str], parents: Sequence[int]
 
 
 def _by_names(doll: Ragdoll, names: Sequence[str]) -> dict[str, int]:
-    """Joints with the names of bodies, or else of their first riders."""
+    """Return the joints by body: of the body's name, else of the first of its riders that
+    has one.
+    """
     exact = {name: k for k, name in reversed([*enumerate(names)])}
     loose = {_key(name): k for k, name in reversed([*enumerate(names)])}
     found: dict[str, int] = {}
@@ -58,7 +62,9 @@ def _by_names(doll: Ragdoll, names: Sequence[str]) -> dict[str, int]:
 
 
 def _key(name: str) -> str:
-    """The name in lower case without a namespace; a BVH file has no spaces in names."""
+    """Return the name in lower case, without a namespace, and with _ for spaces, which names in BVH
+    files do not have.
+    """
     return '_'.join(re.split('[:|]', name)[-1].split()).casefold()
 
 
@@ -88,8 +94,8 @@ def _by_roles(doll: Ragdoll, names: Sequence[str], parents: Sequence[int]) -> di
 
 def _segment(role: str, side: int, those: list[int], joints: Mapping[tuple[str, int], list[int]],
              parents: Sequence[int]) -> int:
-    """Of several joints of one role the last above the limb's next: CMU has LHipJoint, LeftUpLeg;
-    else the first.
+    """Return the joint of ``those``, all of one role, that is the last above the limb's next
+    segment, else the first: CMU has LHipJoint and LeftUpLeg.
     """
     up = joints.get((NEXT_ROLE.get(role, ''), side), [-1])[0]
     while up >= 0 and up not in those:

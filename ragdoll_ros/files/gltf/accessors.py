@@ -33,9 +33,9 @@ def read_numbers(file: GltfFile, index: object, kind: str, where: str) -> np.nda
 
 
 def read_indices(file: GltfFile, index: object, kind: str, limit: int, where: str) -> np.ndarray:
-    """Values (count, width) int32 of an accessor, each in 0 to ``limit`` - 1.
+    """Return values (count, width) int32 of an accessor, each in 0 to ``limit`` - 1.
 
-    Raises WrongForm for floats, OutOfRange for a value outside; else as read_floats.
+    Raises WrongForm for floats, OutOfRange for a value outside; else as read_numbers().
     """
     values = _read(file, index, kind, where)
     if values.dtype.kind == 'f':

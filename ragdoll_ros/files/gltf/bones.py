@@ -56,7 +56,9 @@ def unskinned_meshes(file: GltfFile) -> list[int]:
 
 
 def _bone_of_mesh(file: GltfFile, nodes: Nodes, node: int) -> int:
-    """Bone of an unskinned mesh: its parent if that has this mesh only, as a leaf, else itself."""
+    """Return the bone of an unskinned mesh: the parent of its ``node`` if the node is the only leaf
+    among the parent's children and the parent has no mesh; else the node.
+    """
     parent = nodes.parents[node]
     if parent < 0 or nodes.children[node]:
         return node

@@ -27,7 +27,7 @@ class CharacterFile:
 
     @functools.cached_property
     def animations(self) -> dict[str, NodeAnimation]:
-        """By unique names. Raises a ModelError for a broken one."""
+        """Animations by unique names. Raises a ModelError for a broken one."""
         found = read_animations(self.file)
         names = unique_names([each.entry.get('name') for each in found], 'animation')
         return dict(zip(names, found, strict=True))
@@ -82,7 +82,9 @@ def file_to_doll(doll: Ragdoll, source: CharacterFile) -> np.ndarray:
 
 
 def _places(doll: Ragdoll, bones: Bones) -> dict[int, tuple[Pose, np.ndarray]]:
-    """Pose in the doll's bind pose, and bind matrix, of each rider, by its node."""
+    """Return the pose in the doll's bind pose and the bind matrix of each rider, by its node.
+    Raises UnknownBone.
+    """
     index = {name: k for k, name in enumerate(bones.names)}
     found = {}
     for rider in doll.riders:
@@ -97,7 +99,9 @@ def _places(doll: Ragdoll, bones: Bones) -> dict[int, tuple[Pose, np.ndarray]]:
 
 def _edges(places: dict[int, tuple[Pose, np.ndarray]],
            source: CharacterFile) -> tuple[np.ndarray, np.ndarray]:
-    """From the nearest rider above to each rider (e, 3): in the doll, in the file."""
+    """Return the vectors (e, 3) from the nearest rider above to each rider: in the doll, in the
+    file. If no rider has one above, they begin at the origin.
+    """
     ours, theirs = [], []
     for node, (pose, bind) in places.items():
         up = source.nodes.nearest(source.nodes.parents[node], places)

@@ -1,8 +1,8 @@
 """Motions of a doll's bodies by the animations of its character's file.
 
-A body of the doll moves as its bone of the character does: by N inv(B), with the global transform N
-of the bone's node and its bind matrix B, which also moves the skin. Of a scale or shear only the
-nearest rotation is taken.
+A body of the doll moves as its bone of the character does: by N inv(B), where N is the global
+transform of the bone's node and B its bind matrix, as the skin does. The body's orientation follows
+the nearest rotation, without scale and shear; its centre of mass follows the whole transform.
 """
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class CharacterMotion:
 
     @property
     def duration(self) -> float:
-        """s, from its beginning at 0. Raises a ModelError for a broken track."""
+        """Duration, s, from 0 to the last key. Raises a ModelError for a broken track."""
         return self._source.animations[self.name].duration
 
     @property
     def key_times(self) -> np.ndarray:
-        """(k,) s, of the keys of all tracks."""
+        """Times (k,) of the keys of all tracks, s."""
         tracks = self._source.animations[self.name].tracks.values()
         return np.concatenate([each.times for each in tracks])
 

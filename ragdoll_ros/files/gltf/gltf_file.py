@@ -171,7 +171,9 @@ class GltfFile:
 
 
 def get_container(entry: dict, key: str, kind: type, where: str) -> dict | list:
-    """Value of a key, a dict or list as ``kind``; empty where missing, WrongForm for another."""
+    """Return the value of a key, a dict or list as ``kind`` says; empty where missing. Raises
+    WrongForm for another type.
+    """
     value = entry.get(key)
     if value is None:
         return kind()

@@ -10,7 +10,9 @@ MAGIC_NUMBERS = {b'\x89PNG': 'image/png', b'\xff\xd8\xff': 'image/jpeg', b'RIFF'
 
 
 def read_image(file: GltfFile, image: dict, where: str, most: float = math.inf) -> bytes:
-    """At most ``most`` encoded bytes of an entry of ``images``. Raises a ModelError or OSError."""
+    """Return the encoded bytes of an entry of ``images``. Raises a ModelError, also for more than
+    ``most`` bytes, or OSError.
+    """
     uri, view = image.get('uri'), image.get('bufferView')
     if view is not None:
         entry = file.entry('bufferViews', view, where)

@@ -1,13 +1,13 @@
 """Animations of a glTF file: local transforms of its nodes over time, and their derivatives.
 
 Section 3.11 (Animations) and appendix C (Animation Sampler Interpolation Modes) of the glTF 2.0
-specification. The derivative is that of the interpolation: of LINEAR keys constant between two, of
-STEP keys zero, of CUBICSPLINE keys that of the spline; at a key the mean of both sides. Before the
-first key of a track and after its last, it stands.
+specification. The derivative is that of the interpolation: constant between LINEAR keys (of
+rotations, the angular velocity is), zero for STEP keys, that of the spline for CUBICSPLINE keys; at
+a key, the mean of both sides. Before its first key and after its last, a track is constant.
 
 Most files are baked: LINEAR keys at 24 or 30 a second, between which velocities would be those of
-chords. Such keys are read as samples of a smooth motion, a cubic spline through them whose slopes
-are centred differences of order 4.
+chords. Such keys are read as samples of a smooth motion: a cubic spline through them, whose slopes
+are centred differences of order 4, near the ends of order 2.
 """
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class NodeAnimation:
 
     @property
     def duration(self) -> float:
-        """s, from 0 to its last key."""
+        """Duration, s, from 0 to the last key."""
         return max(float(track.times[-1]) for track in self.tracks.values())
 
     def worlds(self, nodes: Nodes, times: ArrayLike) -> tuple[np.ndarray, np.ndarray]:

@@ -48,8 +48,9 @@ def read_hulls(path: Path, scale: tuple[float, ...] = UNSCALED) -> tuple[Hull, .
 
 @functools.lru_cache(maxsize=64)
 def _hulls_of_shells(mesh: Mesh) -> tuple[Hull, ...]:
-    """The hull of each closed surface of a mesh of several, exactly; none where one does not fit,
-    or where two may overlap, by their bounding boxes: overlaps would count twice.
+    """Return the exact hull of each closed surface of a mesh of several. Empty if one hull does not
+    fit, if there are more than MOST_HULLS, or if the bounding boxes of two show that they may
+    overlap, as overlaps would count twice.
     """
     shells = shells_of(mesh)
     if not 1 < shells.max() + 1 <= MOST_HULLS:
@@ -66,7 +67,9 @@ def _hulls_of_shells(mesh: Mesh) -> tuple[Hull, ...]:
 
 
 def _may_overlap(hulls: list[Hull]) -> bool:
-    """Whether the bounding boxes of two hulls have more than TOUCHING of a length in common."""
+    """Whether the bounding boxes of two hulls overlap along all axes by more than TOUCHING times
+    the largest extent.
+    """
     lower, upper = (np.array([hull.bounds[side] for hull in hulls]) for side in range(2))
     common = np.minimum(upper[:, None], upper) - np.maximum(lower[:, None], lower)
     allowed = TOUCHING * (upper - lower).max()

@@ -48,7 +48,9 @@ PACKAGE_SCHEMES = ('package', 'model')
 
 
 def find_file(name: str, folder: Path | None) -> Path | None:
-    """File that one in ``folder`` (None: unknown) names; None if it does not exist."""
+    """Find the file that ``name`` refers to in a file in ``folder`` (None: unknown). Returns None
+    if it does not exist.
+    """
     scheme, found, rest = name.partition('://')
     if not found:
         scheme, rest = 'file', name
@@ -170,8 +172,9 @@ def _qhull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _nearly_on_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Indices of vertices that are nearly on the longest edge of their triangle, which so has no
-    normal. Qhull makes such triangles of points that rounding has moved off a line.
+    """Return the indices of vertices that are nearly on the longest edge of their triangle, which
+    therefore has no normal. Qhull makes such triangles of points that rounding has moved off a
+    line.
     """
     corners = vertices[faces]
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
@@ -183,8 +186,8 @@ def _nearly_on_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def enclosed_volume(mesh: Mesh) -> float:
-    """Volume, m^3, of the inside of a mesh that is one closed surface; of others NaN: their signed
-    volumes count twice where they overlap. Needs trimesh and scipy.
+    """Return the volume, m^3, inside a mesh that is one closed surface; NaN for others: of several
+    surfaces, signed volumes count twice where they overlap. Needs trimesh and scipy.
     """
     import trimesh
 
@@ -194,8 +197,8 @@ def enclosed_volume(mesh: Mesh) -> float:
 
 
 def shells_of(mesh: Mesh) -> np.ndarray:
-    """Index (t,) of the surface of each face: faces are of one where they alone have an edge in
-    common. Those that touch may have vertices and edges at the same place. Needs trimesh and scipy.
+    """Return the index (t,) of the surface of each face. Two faces are of one surface if they alone
+    share an edge; so surfaces that touch at vertices or edges stay apart. Needs trimesh and scipy.
     """
     import trimesh
 

@@ -1,7 +1,8 @@
-"""Bodies from a URDF or SDF, in a scene's `bodies:` the entries `{urdf: FILE}` and `{sdf: FILE}`.
+"""Bodies from a URDF or SDF: the entries `{urdf: FILE}` and `{sdf: FILE}` of a scene's `bodies:`.
 
-Static ones: one of the primitive shapes of each link, and one of each plane and each mesh that a
-link has. With `follow` a robot that moves: a body of each link, in the link's frame.
+Static: for each link a body of its primitive shapes, to which meshes as `box` or `hulls` belong,
+and one for each plane and each other mesh. With `follow` a robot that moves: a body for each link,
+in the link's frame.
 """
 import dataclasses
 import itertools
@@ -66,8 +67,9 @@ PRIMITIVES = 'a box, sphere, cylinder or capsule'
 @dataclass(frozen=True)
 class PlacedRobot:
     """The bodies of a file's links, in the file's frame; and the pose of that frame in the world:
-    ``position`` (3,) m, ``orientation`` x, y, z, w. With ``joints`` it is one that moves: its
-    ``links`` are in their own frames, whose poses in the file's are ``poses``.
+    ``position`` (3,) m, ``orientation`` x, y, z, w. Of a robot that moves, each of ``links`` is in
+    its own frame, ``poses`` are the poses of these frames in the file's frame, and ``joints``
+    connect the links.
     """
 
     name: str
@@ -95,7 +97,7 @@ class PlacedRobot:
                             **_placed(self._frame.compose(pose)))
 
     def robot(self) -> Robot:
-        """What moves the links."""
+        """Return the Robot that moves the links."""
         return Robot(self.name, self.joints, {body.name: self._name_of(body)
                                               for body in self.links},
                      self.position, self.orientation)
@@ -185,7 +187,9 @@ def _bodies(link: UrdfLink, pose: Pose, entry: dict, folder: Path,
 
 def _mesh_shapes(mesh: UrdfMesh, how: str | None,
                  folder: Path) -> Iterator[tuple[Box | Mesh, Pose]]:
-    """The shapes for a mesh, of one of MESHES, and their poses in the link's frame."""
+    """Yield the shapes that stand for a mesh, and their poses in the link's frame; ``how`` is one
+    of MESHES. Raises a ModelError, also if ``how`` is None.
+    """
     if how is None:
         raise errors.WrongForm('mesh', mesh.file, f'{PRIMITIVES}; or `meshes: exact` for its '
                                'triangles, `hull` or `hulls` for its convex hull or several, `box` '
@@ -210,8 +214,8 @@ def _placed(pose: Pose) -> dict[str, Any]:
 
 
 def _leaders(tree: UrdfTree) -> dict[str, UrdfMimic]:
-    """What each joint that mimics another follows, by child; that one mimics none. Raises
-    UnknownJoint, JointCycle.
+    """Return what each mimicking joint follows, by child: a joint that mimics none itself, a
+    multiplier and an offset. Raises UnknownJoint, JointCycle.
     """
     by_name = {joint.name: joint for joint in tree.joints.values()}
     leaders = {}
@@ -234,7 +238,9 @@ def _leaders(tree: UrdfTree) -> dict[str, UrdfMimic]:
 
 def _robot_joint(joint: UrdfJoint, values: dict[str, float],
                  leader: UrdfMimic | None) -> RobotJoint:
-    """A joint of a robot that moves; of a kind that has not one axis it is fixed."""
+    """Return a joint of a robot that moves; of a kind that is not in ROBOT_JOINTS it
+    becomes fixed.
+    """
     kind = joint.kind if joint.kind in ROBOT_JOINTS else 'fixed'
     return RobotJoint(joint.name, kind, joint.parent, joint.child, floats(joint.origin.position),
                       floats(joint.origin.orientation), floats(joint.axis),
@@ -244,8 +250,8 @@ def _robot_joint(joint: UrdfJoint, values: dict[str, float],
 
 def _values(tree: UrdfTree, leaders: dict[str, UrdfMimic],
             given: dict[str, float]) -> dict[str, float]:
-    """Values of all joints, rad or m by child, of which some are ``given``, degrees by name; those
-    that have ``leaders`` follow them.
+    """Return values of joints, rad or m by child; others are zero. Some are ``given``, in degrees
+    by name, else zero or the nearest within the limits; joints that have ``leaders`` follow them.
     """
     joints = {joint.name: joint for joint in tree.joints.values()
               if joint.kind in ROTATING_KINDS and joint.child not in leaders}

@@ -23,7 +23,7 @@ MODEL_FRAME = Pose()
 
 
 class SdfModel:
-    """A <model>, or a <world> as one; ``prefix`` is what its names have in the file's scope.
+    """A <model>, or a <world> as one; ``prefix`` is put before its names in the file's scope.
 
     Its methods raise RecursionError where a frame is relative to itself.
     """
@@ -41,7 +41,9 @@ class SdfModel:
         self._poses: dict[str, Pose] = {}
 
     def pose(self, name: str) -> Pose:
-        """Pose of a named frame in the model's own."""
+        """Return the pose of a named frame in the model's frame. Raises WrongForm for an unknown
+        name.
+        """
         if name in OWN_FRAMES:
             return MODEL_FRAME
         model, _, inner = name.partition('::')
@@ -55,7 +57,9 @@ class SdfModel:
         return self._poses[name]
 
     def place(self, element: ElementTree.Element, base: str) -> Pose:
-        """Pose of an element in the model's frame; ``base`` is the frame of a pose without one."""
+        """Return the pose of an element in the model's frame; ``base`` is the frame that its <pose>
+        is relative to where it names none.
+        """
         found = element.find('pose')
         if found is None:
             return self.pose(base)
@@ -64,7 +68,9 @@ class SdfModel:
             found, f'{self.prefix}{element.get("name", element.tag)}.pose'))
 
     def link_of(self, name: str) -> str | None:
-        """Link, by its name in the file, that a frame is attached to; None: the world, or none."""
+        """Return the name in the file of the link to which a frame is attached; None if that is the
+        world, or if there is no such link.
+        """
         model, _, inner = name.partition('::')
         if inner and model in self.models:
             return self.models[model].link_of(inner)

@@ -1,7 +1,7 @@
 """SDF parser: links of models and worlds with shapes and inertias, and joints, as a UrdfTree.
 
-Names are those in the file's only model; in a world, or of several models, model::link. Surfaces,
-sensors and plugins are not read. http://sdformat.org/spec
+Links and joints have their names in the model if it is the file's only one, else the names
+model::link. Surfaces, sensors and plugins are not read. http://sdformat.org/spec
 """
 import math
 from collections.abc import Iterator
@@ -44,7 +44,9 @@ KINDS = {'ball': 'spherical', 'universal': 'revolute', 'revolute2': 'revolute'}
 
 
 class SdfAxis(NamedTuple):
-    """An axis (3,) of a joint, in its frame; N m s/rad and N m (N s/m and N if prismatic)."""
+    """An axis ``xyz`` (3,) of a joint, in the joint's frame; limits in rad, damping in N m s/rad,
+    friction in N m (N s/m and N if prismatic).
+    """
 
     xyz: np.ndarray = np.array([1.0, 0.0, 0.0])
     limits: tuple[float, float] | None = None
@@ -55,7 +57,7 @@ class SdfAxis(NamedTuple):
 
 @dataclass
 class SdfJoint:
-    """A joint between two links; ``pose`` is that of its frame in the file's."""
+    """A joint between two links; ``pose`` is the pose of the joint's frame in the file's frame."""
 
     name: str
     kind: str
@@ -100,11 +102,12 @@ def _models(scope: SdfModel, frame: Pose) -> Iterator[tuple[SdfModel, Pose]]:
 
 def _tree(name: str, links: dict[str, UrdfLink], poses: dict[str, Pose],
           joints: list[SdfJoint]) -> UrdfTree:
-    """Tree of links: of several joints of a link the first moves it. Another one moves its own
-    parent, if nothing else does and that closes no loop.
+    """Return the tree of links. If a link is the child of several joints, the first one moves it. A
+    further one is reversed, so that it moves its own parent, if nothing else moves that and no loop
+    closes; else the joint is left out.
 
-    A joint of SDF turns about its own frame, one of URDF about its child's: a link without a shape
-    is between.
+    A joint of SDF turns about its own frame, one of URDF about its child's frame: so a link without
+    a shape is put between.
     """
     tree, held = UrdfTree(name, dict(links), {}), {joint.child for joint in joints}
     for joint in joints:
@@ -151,7 +154,9 @@ def _fixed(parent: str, child: str, pose: Pose) -> UrdfJoint:
 
 
 def _links(scope: SdfModel) -> Iterator[tuple[UrdfLink, Pose]]:
-    """Links of a model with their poses in its frame; what is included is one that has no shape."""
+    """Yield the links of a model with their poses in its frame; an <include> gives a link without a
+    shape.
+    """
     for element in scope.element.findall('link'):
         name = element.get('name', '')
         pose = scope.place(element, '')
@@ -211,7 +216,9 @@ def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose) -> N
 
 
 def _joints(scope: SdfModel, frame: Pose, version: str) -> Iterator[SdfJoint]:
-    """Joints of a model between links; those of a kind without AXES have one that means nothing."""
+    """Yield the joints of a model between links; those of a kind without AXES get a default axis,
+    which means nothing.
+    """
     for element in scope.element.findall('joint'):
         name = f'{scope.prefix}{element.get("name", "")}'
         ends = [child_text(element, end, f'joint {name}') for end in ('parent', 'child')]
@@ -251,7 +258,7 @@ def _axis(scope: SdfModel, joint: ElementTree.Element, tag: str, pose: Pose,
 
 
 def _limits(axis: ElementTree.Element, where: str) -> tuple[float, float] | None:
-    """Limits of an axis, rad or m; None without."""
+    """Return the limits of an axis, rad or m; None if one is missing or exceeds UNLIMITED."""
     texts = [axis.findtext(f'limit/{end}', default) for end, default in (
         ('lower', '-inf'), ('upper', 'inf'))]
     try:

@@ -1,6 +1,6 @@
 """URDF parser: links with shapes and inertias, joints, and forward kinematics.
 
-Transmissions, sensors, colours and what else has no part in the motion are not read.
+Transmissions, sensors, colours and all else that has no part in the motion are not read.
 """
 import math
 from dataclasses import dataclass, field
@@ -66,7 +66,7 @@ class UrdfLink:
 
 
 class UrdfMimic(NamedTuple):
-    """That a joint has the value multiplier * that of ``joint`` + offset."""
+    """What a joint follows: its value is multiplier * (the value of ``joint``) + offset."""
 
     joint: str
     multiplier: float = 1.0
@@ -92,7 +92,7 @@ class UrdfJoint:
 
 @dataclass
 class UrdfTree:
-    """Links by name and joints by child."""
+    """A tree of links: links by name, joints by the name of their child."""
 
     name: str
     links: dict[str, UrdfLink]
@@ -170,7 +170,9 @@ def _link(element: ElementTree.Element) -> UrdfLink:
 
 
 def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose, where: str) -> None:
-    """Add a shape or mesh to the link; its tag to ``left_out`` if it is neither, or has no size."""
+    """Add a shape, mesh or plane to the link; add its tag to ``left_out`` if it is neither shape
+    nor mesh, or has no size.
+    """
     kind = element.tag
     if kind == 'mesh':
         scale = tuple(_vector(element, 'scale', where, (1, 1, 1)))

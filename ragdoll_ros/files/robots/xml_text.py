@@ -55,9 +55,9 @@ def parse_root(text: str, tag: str) -> ElementTree.Element:
 
 
 def _declare_prefixes(text: str) -> str:
-    """The text, whose first element declares every prefix that the text uses and does not declare,
-    as those of sensors in old files: other tools do not look at prefixes. That of xacro is not: it
-    has to be expanded.
+    """Return the text with declarations, in its first <robot> or <sdf>, of all prefixes that it
+    uses but does not declare, such as those of sensors in old files: other tools ignore prefixes.
+    The prefix xacro is not declared, as a xacro has to be expanded first.
     """
     prefixes = {prefix for found in PREFIX.finditer(text) for prefix in found.groups() if prefix}
     missing = [prefix for prefix in sorted(prefixes)

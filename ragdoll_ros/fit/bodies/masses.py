@@ -27,8 +27,8 @@ def share_mass(total: float | None, sharing: str, character: Character, groups: 
     """Mass of each group's body, kg; ``shapes`` are the volumes of the bodies' shapes, m^3.
 
     ``total`` is the mass of the doll, kg; None: the skin's volume times the density of water.
-    ``sharing`` is 'volume' (of the skin), 'proportions' (of a person) or 'best': by volume, but
-    for one of a person's proportions the geometric mean of both, because skin weights change
+    ``sharing`` is 'volume' (of the skin), 'proportions' (of a person) or 'best': by volume, but for
+    a doll with a person's proportions the geometric mean of both, because skin weights change
     beside the joints, not at them. A note reports an unusable skin volume. Raises NotPositive,
     NotFinite for a bad total.
     """
@@ -49,7 +49,9 @@ def share_mass(total: float | None, sharing: str, character: Character, groups: 
 
 def _group_volumes(character: Character, groups: list[BodyGroup], shapes: np.ndarray,
                    notes: list[str]) -> np.ndarray:
-    """Skin volume of each group, m^3, averaged over left and right."""
+    """Skin volume of each group, m^3, averaged over left and right and limited by its shape's; its
+    shape's where the whole skin is unusable.
+    """
     carriers = np.full(len(character.vertices), -1)
     for index, group in enumerate(groups):
         carriers[group.vertices[group.vertices < len(carriers)]] = index
@@ -85,7 +87,7 @@ def _anthropometric_shares(groups: list[BodyGroup], volumes: np.ndarray) -> np.n
 def skin_volumes(character: Character, carriers: np.ndarray, count: int) -> np.ndarray:
     """Skin volume (count,) m^3 of each body; ``carriers`` (v,) is each vertex's body, or -1.
 
-    Near zero where the skin is open or flat.
+    Boundaries are capped; the sum is not negative. Near zero where the skin is flat.
     """
     vertices = character.vertices - character.vertices.mean(axis=0)
     _, first, places = np.unique(np.round(vertices / (WELD_TOLERANCE * character.extent)), axis=0,
@@ -122,7 +124,7 @@ def _boundary_edges(triangles: np.ndarray, owners: np.ndarray,
 
 
 def _boundary_loops(edges: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Label (e,) of each edge's (e, 2) boundary: connected, and with one neighbour."""
+    """Label (e,) of each edge's boundary: connected edges (e, 2) with the same neighbour (e,)."""
     heads: dict[tuple[int, int], tuple[int, int]] = {}
 
     def head(key: tuple[int, int]) -> tuple[int, int]:
@@ -139,7 +141,9 @@ def _boundary_loops(edges: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _cap_boundaries(rims: np.ndarray, labels: np.ndarray) -> list[np.ndarray]:
-    """Triangles (t, 3, 3) m that cap the boundary edges (e, 2, 3) m, one fan for each label."""
+    """Triangles (t, 3, 3) m that cap the boundary edges (e, 2, 3) m: one fan for each label, and
+    one for what these leave open.
+    """
     fans, open_ = [], []
     for label in range(labels.max(initial=-1) + 1):
         edges = rims[labels == label]

@@ -28,7 +28,9 @@ def penetration_depth(bone: Bone, points: np.ndarray) -> np.ndarray:
 
 def overlapping_pairs(bones: tuple[Bone, ...],
                       least: float = MIN_OVERLAP) -> list[tuple[str, str]]:
-    """Names of the pairs of bodies that overlap by more than ``least`` m; a gap if negative."""
+    """Names of the pairs of bodies that overlap by more than ``least`` m; if ``least`` is negative,
+    also of those with a gap smaller than ``-least``.
+    """
     samples = [sample_points(bone) for bone in bones]
     radii = [float(np.linalg.norm(bone.shape.half_extents)) for bone in bones]
     found = []

@@ -36,10 +36,11 @@ MAX_EXTENSION = 0.4
 
 def place_anchors(groups: list[BodyGroup], fits: list[FittedShape],
                   frames: list[np.ndarray]) -> list[FittedShape]:
-    """Choose each group's anchor, and extend the shapes to reach their anchors.
+    """Choose each group's anchor, and extend shapes within MAX_EXTENSION of an anchor to reach it.
 
-    The anchor is the first candidate within ANCHOR_TOLERANCE of both bodies, else the nearest.
-    The ``fits`` are centred in the doll's frame; ``frames`` (3, 3) have their axes as columns.
+    The anchor is the first candidate within ANCHOR_TOLERANCE of both bodies, else the nearest. The
+    centres of the ``fits`` are in the doll's frame; ``frames`` (3, 3) have the shapes' axes as
+    columns.
     """
     jointed = [(index, group) for index, group in enumerate(groups)
                if group.parent >= 0 and not group.fixed]
@@ -73,8 +74,8 @@ def trim_overlaps(groups: list[BodyGroup], fits: list[FittedShape],
                   frames: list[np.ndarray]) -> list[FittedShape]:
     """The groups' shapes without shallow overlaps between bodies that no joint connects.
 
-    A cut that would move a body away from one of its joints is not made. The ``fits`` are centred
-    in the doll's frame; ``frames`` (3, 3) have the shapes' axes as columns.
+    A cut that would move a body away from one of its joints is not made. The centres of the
+    ``fits`` are in the doll's frame; ``frames`` (3, 3) have the shapes' axes as columns.
     """
     bones = [Bone(group.name, fit.shape, 1.0, fit.centre, rotation.from_matrix(frame))
              for group, fit, frame in zip(groups, fits, frames, strict=True)]
@@ -135,14 +136,18 @@ def _support(bone: Bone, directions: np.ndarray) -> np.ndarray:
 
 
 def _cut(bone: Bone, direction: np.ndarray, depth: float) -> Bone:
-    """The body cut by ``depth`` m on the side of a unit direction (3,); the far side stays."""
+    """The body cut by ``depth`` m on the side of a unit direction (3,); the opposite side does not
+    move.
+    """
     local = rotation.rotate(rotation.inverse(np.array(bone.orientation)), direction)
     shape, centre = _shrink(bone.shape, local, depth)
     return dataclasses.replace(bone, shape=shape, position=bone.pose.apply(centre[None])[0])
 
 
 def _shrink(shape: Shape, direction: np.ndarray, depth: float) -> tuple[Shape, np.ndarray]:
-    """The remaining shape, and its centre (3,) m in the frame of the given shape."""
+    """Shape after a cut by ``depth`` m on the side of a unit direction (3,), and its centre (3,) m,
+    both in the frame of the given shape.
+    """
     if isinstance(shape, Sphere):
         return Sphere(shape.radius - depth / 2), -direction * depth / 2
     if isinstance(shape, Box):

@@ -3,10 +3,10 @@
 In the anatomical pose a person stands upright, arms and legs down. The ranges are the averages of
 the American Academy of Orthopaedic Surgeons (Joint Motion: Method of Measuring and Recording,
 1965). The first angle is about an axis fixed in the parent: abduction of an arm, about forward;
-flexion of all others. The second moves the limb out of that plane, the third is the twist. So an
-arm bound straight out and one bound half down differ in the zero of the first angle only. A wrist
-has no twist: the forearm twists, which has no such joint here. An ankle's second angle is about
-the foot's long axis.
+flexion of all others. The second moves the limb out of that plane, the third is the twist. An arm
+whose bind pose is straight out therefore differs from one that is half down in the zero of the
+first angle only. A wrist has no twist, because the forearm twists; the doll has no joint for that.
+An ankle's second angle is about the foot's long axis.
 """
 import math
 from dataclasses import dataclass
@@ -58,8 +58,8 @@ def human_joint(parent: str, child: str, role: str, side: int, anchor: np.ndarra
                 rest: NeutralDirections, share: float = 1.0) -> Joint | None:
     """Joint of a limb whose role has ranges: ball or, with two angles, universal.
 
-    ``side`` is 1 left, -1 right; ``share`` is the fraction of the ranges of this joint. None where
-    the limb is bound too steeply out of the plane of the first angle.
+    ``side`` is 1 left, -1 right; ``share`` is this joint's fraction of the role's ranges. None
+    where the limb is bound too steeply out of the plane of the first angle.
     """
     ranges, axis = RANGES[role], rest.axis
     elevation = math.asin(max(-1.0, min(1.0, float(rest.along @ axis))))

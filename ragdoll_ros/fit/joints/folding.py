@@ -53,9 +53,10 @@ class Fold:
 
 def leg_fold(character: Character, groups: list[BodyGroup], index: int,
              along: np.ndarray) -> Fold | None:
-    """Fold of the joint to a group's parent if it is a knee, elbow, hock or wrist, else None.
+    """Fold of the joint to a group's parent if it is a knee, elbow, hock, wrist or a digit's joint.
 
-    ``along`` (3,) is the unit direction of the group's bone.
+    None for other joints and where the fold direction is unknown. ``along`` (3,) is the unit
+    direction of the group's bone.
     """
     group, leg = groups[index], _leg(groups, index)
     above = parent_direction(character, groups, index)
@@ -117,7 +118,9 @@ def note_guesses(character: Character, groups: list[BodyGroup],
 
 def parent_direction(character: Character, groups: list[BodyGroup],
                      index: int) -> np.ndarray | None:
-    """Unit direction (3,) from the parent's anchor to the group's; None below the root."""
+    """Unit direction (3,) from the parent's anchor to the group's; None for the root, for its
+    children and where the anchors coincide.
+    """
     group, parent = groups[index], groups[groups[index].parent]
     step = group.anchor - parent.anchor
     length = float(np.linalg.norm(step))
@@ -130,7 +133,7 @@ def _listed(names: list[str]) -> str:
 
 
 def _leg(groups: list[BodyGroup], index: int) -> list[int]:
-    """Groups of a leg from its first to this one: below the nearest branching body."""
+    """Indices of a leg's groups, from the first below a branching body or the root to this one."""
     leg = [index]
     while (above := groups[leg[0]].parent) >= 0 and groups[above].parent >= 0 and sum(
             group.parent == above for group in groups) == 1:

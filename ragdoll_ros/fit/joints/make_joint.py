@@ -103,7 +103,9 @@ def with_damping(joint: Joint, parent: Bone, child: Bone) -> Joint:
 
 def _by_topology(parent: str, child: str, anchor: np.ndarray, above: np.ndarray | None,
                  along: np.ndarray, chain: bool) -> Joint:
-    """A bend within a limb is a hinge that straightens and folds; all others are ball joints."""
+    """Joint by the bind pose: a hinge that straightens and folds for a bend within a limb, else a
+    ball.
+    """
     if above is None:
         return _ball(parent, child, anchor, along, *FIRST_BALL)
     bend = _angle(above, along)
@@ -129,7 +131,9 @@ def _fold_axis(above: np.ndarray | None, along: np.ndarray, toward: np.ndarray,
 
 
 def _hinge_axis(along: np.ndarray, toward: np.ndarray) -> np.ndarray:
-    """Unit axis that rotates ``along`` towards a direction; upwards if they are parallel."""
+    """Unit axis that rotates ``along`` towards a direction. If they are nearly parallel, it rotates
+    ``along`` upwards, or to the left where ``along`` is vertical.
+    """
     axis = np.cross(along, toward)
     if np.linalg.norm(axis) < 0.3:
         axis = np.cross(along, UP if abs(along @ UP) < 0.9 else LEFT)

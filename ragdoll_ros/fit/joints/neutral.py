@@ -1,7 +1,8 @@
 """Directions of a person's limbs in the anatomical pose, transferred to the bind pose.
 
-In the anatomical pose arms and legs hang down and the feet are level. Shoulders and hips refer to
-the trunk, which is upright in every bind pose; a wrist, ankle or head to the bone before it.
+In the anatomical pose arms and legs hang down and the feet are level. Shoulders, hips and the
+lowest joint of neck and head refer to the trunk, which is upright in every bind pose; a wrist, an
+ankle and further joints of neck and head refer to the bone before them.
 """
 import math
 from dataclasses import dataclass
@@ -44,8 +45,8 @@ def find_neutral(character: Character, groups: list[BodyGroup], index: int, side
                  above: np.ndarray | None, along: np.ndarray) -> NeutralDirections | None:
     """Neutral directions of the joint to a group's parent; None where they are undefined.
 
-    ``above`` (3,) is the direction of the previous bone, None below the root; ``along`` (3,) that
-    of the group's own; ``side`` is 1 left, -1 right.
+    ``above`` (3,) is the direction of the parent's bone, as from parent_direction; ``along`` (3,)
+    that of the group's own; ``side`` is 1 left, -1 right.
     """
     group = groups[index]
     if group.role == 'upper_arm':
@@ -71,7 +72,9 @@ def find_neutral(character: Character, groups: list[BodyGroup], index: int, side
 
 def _perpendicular_axis(straight: np.ndarray, axis: np.ndarray,
                         along: np.ndarray) -> NeutralDirections | None:
-    """Directions with the part of ``axis`` perpendicular to ``straight``; None if it is small."""
+    """Neutral directions whose axis is the unit component of ``axis`` perpendicular to
+    ``straight``; None if that component is small.
+    """
     axis = axis - (axis @ straight) * straight
     length = float(np.linalg.norm(axis))
     return NeutralDirections(straight, axis / length, along) if length > 0.3 else None

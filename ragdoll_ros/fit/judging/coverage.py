@@ -21,8 +21,10 @@ bodies' volume counts as the skin's."""
 
 def find_uncovered(doll: Ragdoll, character: Character,
                    parts: dict[str, tuple[str, ...]]) -> list[Finding]:
-    """Bodies that miss their skin; ``parts`` lists the character's bones of each body. What a swing
-    moves, such as hair, has no body to be in.
+    """Findings on the coverage of the skin by the bodies, their volume, and the doll's density.
+
+    ``parts`` lists the character's bones of each body. Skin that swings move, such as hair, does
+    not count for coverage.
     """
     hair = {rider for swing in doll.swings for link in swing.links for rider in link.riders}
     body_of = {bone: name for name, bones in parts.items() for bone in bones if bone not in hair}

@@ -26,7 +26,10 @@ NAMED_PAIRS = 3
 
 @dataclass(frozen=True)
 class FallCost:
-    """Processor time of the ticks of one fall, until it ends or all dolls sleep."""
+    """Processor time of the ticks of one fall, and its contacts.
+
+    The fall ends after DURATION or BUDGET, or when all dolls sleep.
+    """
 
     accuracy: str
     step: float
@@ -44,8 +47,8 @@ class FallCost:
 def measure_costs(scene: Scene) -> list[FallCost]:
     """The costs of the first seconds of a scene, for each of ACCURACIES with the default engine.
 
-    Empty if the scene cannot be simulated. Call it after a first simulation: machine code that is
-    compiled meanwhile would count.
+    Empty if the scene cannot be simulated. Call it after a first simulation, or the compilation of
+    machine code counts as a cost.
     """
     try:
         return [_measure(scene, accuracy) for accuracy in ACCURACIES]

@@ -142,9 +142,10 @@ def _find_overextension(doll: Ragdoll) -> list[Finding]:
 
 
 def _find_wrong_legs(doll: Ragdoll, roles: Sequence[str | None]) -> list[Finding]:
-    """Hinges of an animal's front and hind legs that fold the way that those of no animal do.
+    """Hinges of an animal's front and hind legs that fold in a direction in which no animal's do.
 
-    A leg that the bind pose shows bent against that way is left to _find_overextension.
+    Only bones that point down in the bind pose are checked; for bent hinges see
+    _find_overextension.
     """
     role_of = dict(zip((bone.name for bone in doll.bones), roles, strict=True))
     joints = {joint.child: joint for joint in doll.joints}
@@ -167,7 +168,9 @@ def _find_wrong_legs(doll: Ragdoll, roles: Sequence[str | None]) -> list[Finding
 
 
 def _hip_of(joints: dict[str, Joint], name: str, role_of: dict[str, str | None]) -> str:
-    """The bone of a limb whose joint is its hip or shoulder; '' where none has that role."""
+    """Name of the first bone, from ``name`` towards the root, with a role in HIP_ROLES; '' if there
+    is none.
+    """
     while name in joints and role_of[name] not in HIP_ROLES:
         name = joints[name].parent
     return name if name in joints else ''
@@ -179,9 +182,9 @@ def _joint_finding(joint: Joint, problem: str, wrong: bool) -> Finding:
 
 
 def _forward_motion(doll: Ragdoll, joint: Joint) -> float:
-    """Motion of the child's centre along x to the middle of the first angle's range.
+    """Motion of the child's centre along x, as a fraction of its distance from the anchor.
 
-    A fraction of its distance from the anchor.
+    The motion is from the bind pose to the middle of the first angle's range; 0 without limits.
     """
     pair = joint.angle_limits[0]
     if pair is None:

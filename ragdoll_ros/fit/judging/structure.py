@@ -129,7 +129,9 @@ def _compare_joints(left: Joint, right: Joint, counterparts: dict[str, str]) -> 
 
 def _limit_difference(axis: np.ndarray, other: np.ndarray, limits: Limits | None,
                       others: Limits | None) -> float:
-    """Difference, rad, of limits from the mirror image of those about the other side's axis."""
+    """Largest difference, rad, between ``others`` about ``other`` and the mirror image of
+    ``limits`` about ``axis``; pi where only one of them is unlimited.
+    """
     if limits is None or others is None:
         return 0.0 if limits is others else math.pi
     # Mirroring reverses the sense of a rotation.

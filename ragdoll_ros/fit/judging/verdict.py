@@ -22,7 +22,9 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """'wrong' with a finding that no correct doll has, 'good' without findings."""
+        """'wrong' with a finding that no correct doll has, 'good' without findings, else
+        'doubtful'.
+        """
         if any(finding.wrong for finding in self.findings):
             return 'wrong'
         return 'doubtful' if self.findings else 'good'

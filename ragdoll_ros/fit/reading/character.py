@@ -159,7 +159,9 @@ def _read_appearance(file: GltfFile, skins: Skins, axes: np.ndarray,
 
 def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
              matrix: np.ndarray, notes: list[str]) -> tuple[SpringBone, ...]:
-    """Spring bones of the character; ``matrix`` (3, 3) takes their points to its frame."""
+    """Spring bones of the character; ``matrix`` (3, 3) transforms points of the file to
+    its frame.
+    """
     found = []
     for spring in read_springs(file, nodes, notes):
         carrier = _parent_bone(spring.nodes[0], nodes, place)

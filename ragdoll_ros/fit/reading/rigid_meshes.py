@@ -1,7 +1,7 @@
-"""Meshes without a skin on bones: armour, hats, parts of a robot.
+"""Attachment of meshes without a skin to bones: armour, hats, parts of a robot.
 
-Each becomes skin of one bone with weight 1. In a file without skins each node with a mesh becomes
-a bone, or its parent if that is the pivot of this mesh only.
+Each mesh becomes skin of one bone with weight 1. In a file without skins each node with a mesh
+becomes a bone, or its parent if that is the pivot of this mesh only.
 """
 from dataclasses import replace
 
@@ -14,9 +14,10 @@ from .skins import Skins, primitives, read_appearance, read_positions, read_tria
 
 
 def add_rigid_meshes(file: GltfFile, nodes: Nodes, skins: Skins) -> None:
-    """Add all unskinned meshes; a note counts those without a bone above.
+    """Add all unskinned meshes; a note counts those without an invertible bone above.
 
-    Raises WrongForm where the file has no skin and fewer than two parts.
+    Raises WrongForm where no mesh is skinned and the file has an unused skin or fewer than two
+    parts.
     """
     if not skins.bind_matrices:
         bones = rigid_parts(file, nodes)
@@ -30,7 +31,9 @@ def add_rigid_meshes(file: GltfFile, nodes: Nodes, skins: Skins) -> None:
 
 
 def _add(file: GltfFile, nodes: Nodes, skins: Skins, node: int, bone: int) -> bool:
-    """Add the mesh of a node in the bind pose of its bone; False without an invertible bone."""
+    """Add the mesh of a node, fixed to a bone in its bind pose; False without an
+    invertible bone.
+    """
     if bone < 0 or not abs(np.linalg.det(nodes.worlds[bone])) > 1e-30:
         return False
     place = skins.bind_matrices[bone] @ np.linalg.inv(nodes.worlds[bone]) @ nodes.worlds[node]

@@ -30,8 +30,8 @@ def metres_per_unit(names: tuple[str, ...], parents: tuple[int, ...], positions:
                     vertices: np.ndarray, notes: list[str]) -> float:
     """Metres per unit, with a note where it is an estimate.
 
-    Bones by name, parent and position (n, 3), skin (v, 3), z up, in units of the file. Raises
-    OutOfRange for a skin without an extent.
+    ``names``, ``parents`` and ``positions`` (n, 3) are those of the bones, ``vertices`` (v, 3)
+    those of the skin, z up, in units of the file. Raises OutOfRange for a skin without an extent.
     """
     extents = np.ptp(vertices, axis=0)
     size = float(extents.max())

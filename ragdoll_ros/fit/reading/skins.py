@@ -138,7 +138,7 @@ def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.nda
 
 def read_appearance(file: GltfFile, primitive: dict, points: int,
                     where: str) -> PrimitiveAppearance:
-    """Appearance of a primitive with so many ``points``; broken attributes count as missing."""
+    """Appearance of a primitive with ``points`` vertices; broken attributes count as missing."""
     found = []
     for name, kind, width in (('NORMAL', 'VEC3', 3), ('TEXCOORD_0', 'VEC2', 2)):
         values = np.zeros((points, width))
@@ -153,7 +153,10 @@ def read_appearance(file: GltfFile, primitive: dict, points: int,
 
 def _skin_vertices(points: np.ndarray, slots: np.ndarray, weights: np.ndarray,
                    matrices: np.ndarray) -> np.ndarray:
-    """Linear blend skinning: sum of w_j R_j M_j v, world; unweighted vertices follow joint 0."""
+    """Linear blend skinning to the world frame: sum over joints of weight, matrix and point.
+
+    ``slots`` (v, k) are indices of ``matrices``; unweighted vertices follow joint 0.
+    """
     if np.abs(matrices - matrices[0]).max() <= 1e-6 * np.abs(matrices[0]).max():
         return points @ matrices[0, :3, :3].T + matrices[0, :3, 3]
     weights = np.where(weights.sum(axis=1, keepdims=True) > 0, weights, [1] + [0] * (
@@ -166,7 +169,7 @@ def _skin_vertices(points: np.ndarray, slots: np.ndarray, weights: np.ndarray,
 
 
 def read_triangles(file: GltfFile, primitive: dict, points: int, where: str) -> np.ndarray:
-    """Triangles (t, 3) of a primitive with so many ``points``; none for points and lines."""
+    """Triangles (t, 3) of a primitive with ``points`` vertices; none for points and lines."""
     mode = get_count(primitive, 'mode', where, TRIANGLES)
     if mode not in (TRIANGLES, STRIP, FAN):
         return np.zeros((0, 3), np.int32)

@@ -55,7 +55,10 @@ class SpringBone:
 
 
 def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[SpringBone]:
-    """All spring bones, without points; raises a ModelError for broken data, notes the ignored."""
+    """All spring bones, without points. Notes report those that are ignored.
+
+    Raises a ModelError for broken data.
+    """
     extensions = get_container(file.json, 'extensions', dict, '')
     found: list[SpringBone] = []
     if 'VRMC_springBone' in extensions:

@@ -75,7 +75,9 @@ def colliders_of(entry: dict, groups: list[tuple[SpringCollider, ...]],
 
 
 def placed(collider: SpringCollider, matrix: np.ndarray, bone: int) -> SpringCollider:
-    """The collider with its node's pose in the bind pose, (4, 4), on a character's ``bone``."""
+    """The collider in the frame of ``matrix`` (4, 4), its node's transform in the bind pose, fixed
+    to a character's ``bone``.
+    """
     axis = collider.axis @ matrix[:3, :3].T + matrix[:3, 3]
     scale = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
     if not np.isfinite(axis).all() or not np.isfinite(scale):
@@ -84,13 +86,17 @@ def placed(collider: SpringCollider, matrix: np.ndarray, bone: int) -> SpringCol
 
 
 def transformed(collider: SpringCollider, matrix: np.ndarray) -> SpringCollider:
-    """The collider in a character's frame, in m: ``matrix`` (3, 3) takes points there."""
+    """The collider in a character's frame, in m; ``matrix`` (3, 3) transforms points to
+    that frame.
+    """
     scale = float(np.cbrt(abs(np.linalg.det(matrix))))
     return replace(collider, axis=collider.axis @ matrix.T, radius=collider.radius * scale)
 
 
 def has_size(collider: SpringCollider) -> bool:
-    """Whether a character's collider has a radius that a swing's may have."""
+    """Whether the radius of a character's collider is in the range allowed for a swing's
+    colliders.
+    """
     low, high = COLLIDER_RADIUS_RANGE
     return low <= collider.radius <= high
 

@@ -2,15 +2,16 @@
 
 Each frame of dt s, the tip of a spring bone moves by (1 - drag) times its previous step, by
 stiffness dt in the rest direction and by gravity dt downwards, and is projected back to the length
-l (VRMC_springBone 1.0, "SpringBone Algorithm"; both are speeds, m/s). For a small angle a from rest
+l (VRMC_springBone 1.0, "SpringBone Algorithm"; both are speeds, m/s). For a small angle a from
+rest, a'' one frame before and a' one after,
 
     (1 + e) a' = a + (1 - drag) (a - a''),    e = stiffness dt / l,
 
 so the modes per frame are the roots z of (1 + e) z^2 - (2 - drag) z + 1 - drag = 0. The swing has
 the eigenvalues log(z)/dt: at FRAME_RATE, and for a single segment, its angles equal VRM's at every
-frame. k/J is the product of the eigenvalues, and 2 zeta sqrt(k/J + share g/l) minus their sum, with
-J = m l^2, as each segment swings as if none hung on it. The gravity share keeps the equilibrium
-angle of gravity and stiffness; the swing has one share, the mean over the chain.
+frame. k/J is the product of the eigenvalues, and 2 zeta sqrt(k/J + share g/l) is their negative
+sum, with J = m l^2, as each segment swings as if none hung on it. The gravity share keeps the
+equilibrium angle of gravity and stiffness; the swing has one share, the mean over the chain.
 
 Differences: VRM's drag is relative to the world (or the spring's ``center``), a swing's damping to
 the body; the restoring torque at large angles is proportional to the angle, not to its sine.
@@ -67,7 +68,8 @@ def swing_from_spring(spring: SpringBone, bone: str, metres: float) -> tuple[Swi
 def _rates(joint: SpringJoint, length: float, metres: float = 1.0) -> tuple[float, float]:
     """k/J, 1/s^2, and damping coefficient, 1/s, of a segment of ``length`` m.
 
-    Product and negative sum of log(z) FRAME_RATE for both roots z; ``metres`` as above.
+    Product and negative sum of log(z) FRAME_RATE for both roots z; ``metres`` as for
+    swing_from_spring.
     """
     e = max(joint.stiffness * metres, MIN_STIFFNESS) / (FRAME_RATE * length)
     drag = min(joint.drag, MAX_DRAG)

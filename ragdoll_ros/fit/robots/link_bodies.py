@@ -69,7 +69,9 @@ class LinkMeshes:
 
 
 def link_shapes(link: UrdfLink, meshes: LinkMeshes, notes: list[str]) -> list[PlacedShape]:
-    """Collision shapes of a link in its own frame; empty where nothing defines any."""
+    """Collision shapes of a link in its own frame; without any, a box of its mass and inertia if it
+    has these, else none.
+    """
     notes += [f'{link.name}: {what} is ignored' for what in link.left_out]
     shapes = [*_with_capsules(link.shapes), *meshes.shapes(link, notes)]
     if shapes or link.mass <= 0 or (link.inertia is None and not link.meshes):
@@ -185,9 +187,10 @@ def _sphere_at(shapes: Sequence[PlacedShape], centre: np.ndarray, cylinder: Shap
 
 
 def _equivalent_box(link: UrdfLink) -> PlacedShape | None:
-    """Uniform box of a link's mass and inertia: its edges are a^2 = 6 (Iy + Iz - Ix) / m.
+    """Uniform box of a link's mass and inertia: its edges a follow from a^2 = 6 (Iy + Iz - Ix) / m.
 
-    None without an inertia, or for a density below water / 50 or above 20 times water.
+    Edges are at least MIN_BOX_EDGE. None without an inertia, where no edge is longer, or for a
+    density below water / 50 or above 20 times water.
     """
     if link.inertia is None:
         return None

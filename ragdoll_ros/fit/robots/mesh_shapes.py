@@ -60,7 +60,9 @@ def surface_points(triangles: np.ndarray, count: int) -> np.ndarray:
 
 
 def _smallest(points: np.ndarray, thinnest: float, tolerance: float) -> tuple[Shape, Pose]:
-    """The smallest shape of any kind and axes that contains the points, and its pose."""
+    """The smallest shape of any kind and axes that contains MIN_COVERAGE of the points, and its
+    pose; the smallest of all if none does.
+    """
     def cost(fitted: FittedShape) -> tuple[bool, float]:
         return fitted.coverage < MIN_COVERAGE, fitted.shape.volume
 
@@ -86,7 +88,10 @@ def _cut_points(points: np.ndarray, thinnest: float) -> list[np.ndarray]:
 
 
 def _best_cut(points: np.ndarray, thinnest: float) -> tuple[float, np.ndarray, float]:
-    """Best cut: volume saved, m^3, unit normal (3,) and offset, m; 0 below MIN_SAVING."""
+    """Best cut: volume saved, m^3, unit normal (3,) and offset, m.
+
+    The volume is 0 where no cut saves more than MIN_SAVING.
+    """
     few = points[::-(-len(points) // CUT_POINTS)]
     whole = _box_volume(few, thinnest)
     best = MIN_SAVING * whole, np.zeros(3), 0.0
@@ -102,7 +107,7 @@ def _best_cut(points: np.ndarray, thinnest: float) -> tuple[float, np.ndarray, f
 
 
 def _box_volume(points: np.ndarray, thinnest: float) -> float:
-    """Volume of the smallest box around points, m^3."""
+    """Volume, m^3, of the smallest box around points along one of the candidate axes."""
     return min(float(np.maximum(np.ptp(points @ axes, axis=0), thinnest).prod())
                for axes in _axes(points))
 

@@ -1,11 +1,11 @@
 """URDF to Ragdoll: a robot without motor torques.
 
-A link with a shape or a mesh becomes a body. Its joint becomes a hinge, or part of a universal or
-ball joint where links without a shape are between (as to_urdf writes them). A link without a shape
-is merged into its parent with its mass and inertia, one without a mass with its shapes; one that
-weighs next to nothing is fixed to its parent, with both. Every link's frame becomes a frame of the
-doll, so that it can be published. Angles have the names of the joints in the file, where they count
-from the same zero.
+A link with a shape, a mesh or the inertia of a plausible box becomes a body. Its joint becomes a
+hinge, or part of a universal or ball joint where links that are no bodies are in between (as
+to_urdf writes them). Other links are merged into their parents with mass and inertia. So are, with
+their shapes, a link without a mass that is fixed to its parent, and one that weighs next to
+nothing. Every link's frame becomes a frame of the doll, so that it can be published. Angles have
+the names of the joints in the file, where they count from the same zero.
 """
 import itertools
 import math
@@ -67,7 +67,7 @@ def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
 def doll_from_tree(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str]]:
     """Doll of links and joints, and notes; ``folder`` is that of their file, for its meshes.
 
-    Raises a ModelError for what no doll can be.
+    Raises a ModelError where no doll can represent them.
     """
     notes: list[str] = []
     angles = tree.initial_angles
@@ -111,8 +111,9 @@ def doll_from_tree(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll,
 
 
 def _pairs_of_parts(doll: Ragdoll) -> tuple[tuple[str, str], ...]:
-    """Pairs of bones of one part, which fixed joints connect, and of two parts that a joint
-    connects, without those that a joint itself connects. MuJoCo does not let them collide either.
+    """Pairs of bones of one part, which fixed joints hold together, and of two parts that a joint
+    connects. Pairs that a joint connects directly are omitted. MuJoCo excludes all these from
+    collision too.
     """
     part, beside = {doll.root.name: [doll.root.name]}, []
     for joint in doll.joints_from_root():
@@ -131,7 +132,9 @@ def _pairs_of_parts(doll: Ragdoll) -> tuple[tuple[str, str], ...]:
 
 
 def _light_links(tree: UrdfTree, shapes: dict[str, list[PlacedShape]]) -> dict[str, float]:
-    """Masses of links below LIGHTEST_SHARE of the robot's; of one without a mass, that of water."""
+    """Masses, by name, of links below LIGHTEST_SHARE of the robot's mass; the mass of a link
+    without one is that of its shapes filled with water.
+    """
     whole = sum(link.mass for link in tree.links.values())
     masses = {name: link.mass or DEFAULT_DENSITY * sum(shape.volume for shape, _ in shapes[name])
               for name, link in tree.links.items()}
@@ -140,8 +143,8 @@ def _light_links(tree: UrdfTree, shapes: dict[str, list[PlacedShape]]) -> dict[s
 
 def _find_carriers(tree: UrdfTree, shapes: dict[str, list],
                    light: Collection[str]) -> dict[str, str]:
-    """Carrier of each link: itself if it becomes a body, else an ancestor or a root's child; not
-    itself if it is ``light``.
+    """Carrier of each link: itself if it becomes a body, else its parent's carrier; for links above
+    the first body, and their other branches, that body. A ``light`` link becomes no body.
     """
     carriers: dict[str, str] = {}
     heavy = any(link.mass > 0 for link in tree.links.values())
@@ -176,8 +179,8 @@ def _merge_shapes(tree: UrdfTree, shapes: dict[str, list], carriers: dict[str, s
 def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], light: Collection[str],
            names: dict[str, str], poses: dict[str, Pose], angles: dict[str, float],
            notes: list[str]) -> Joint:
-    """Joint of a body, from the chain of joints between it and its parent body, or a ``light`` link
-    that is fixed to that.
+    """Joint of a body, from the chain of joints between it and its parent body. The chain begins at
+    a ``light`` link, which is fixed to that body, if there is one in between.
     """
     chain = [tree.joints[name]]
     while (chain[0].parent in tree.joints and carriers[chain[0].parent] != chain[0].parent
@@ -202,7 +205,9 @@ def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], light: Collectio
 
 
 def _named_alone(joints: list[Joint]) -> list[Joint]:
-    """The joints, without the names that are those of another's angles or that they have anyway."""
+    """The joints; one loses its given names if any of these is also the name of another angle or a
+    default name.
+    """
     plain = [replace(joint, names=()) for joint in joints]
     counts = Counter(name for joint in joints for name in joint.angle_names)
     taken = {name for joint in plain for name in joint.angle_names}
@@ -224,7 +229,9 @@ def _note_friction(tree: UrdfTree) -> list[str]:
 
 def _combine_hinges(parent: str, child: str, anchor: np.ndarray, chain: list[UrdfJoint],
                     poses: dict[str, Pose], angles: dict[str, float], notes: list[str]) -> Joint:
-    """Hinge, universal or ball joint of one to three hinges whose axes intersect."""
+    """Joint of the hinges of a ``chain`` that coincide with the first one: hinge, universal, ball
+    or, without any, fixed. A note names the other hinges.
+    """
     if not chain:
         return Joint(parent, child, 'fixed', anchor)
     frames = [poses[joint.child] for joint in chain]
@@ -258,7 +265,9 @@ def _limits(joint: UrdfJoint, angles: dict[str, float],
 
 
 def _swing_twist_limits(limits: list) -> tuple:
-    """Swing and twist limits that contain those of successive hinges, the last of them twist."""
+    """Symmetric swing and twist limits that contain those of successive hinges, up to MAX_SWING and
+    a full turn; the last hinge is the twist. None where one has no limits.
+    """
     def symmetric(pairs: list, most: float) -> tuple[float, float] | None:
         widest = max((max(map(abs, pair)) for pair in pairs if pair), default=0.0)
         if None in pairs or widest <= 0:

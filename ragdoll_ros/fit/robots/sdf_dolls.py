@@ -1,7 +1,8 @@
 """SDF to dolls: one for each robot or body of the file that nothing attaches to another.
 
-Links and joints are read as a UrdfTree (files/robots/sdf_tree.py), in which what is free hangs on a
-link WORLD without a shape; from there on a robot is as that of a URDF (robot.py).
+Links and joints are read as a UrdfTree (files/robots/sdf_tree.py), in which all free models hang on
+a link WORLD without a shape. Each is then converted as the robot of a URDF (robot.py); static
+models are left out.
 """
 import itertools
 from collections.abc import Iterator, Sequence
@@ -79,8 +80,8 @@ def _read(tree: UrdfTree, folder: Path | None) -> list[tuple[Placement, tuple[st
 
 
 def _free_parts(tree: UrdfTree) -> Iterator[tuple[str, UrdfTree]]:
-    """The link at the root of each tree that hangs on the link WORLD, and the tree; its names are
-    those within its model.
+    """Root link of each tree that hangs on the link WORLD, and the tree, with names relative to its
+    model.
     """
     root_of: dict[str, str] = {}
     for name in tree.order:
@@ -100,7 +101,9 @@ def _common_model(names: Sequence[str]) -> str:
 
 
 def _named_within(tree: UrdfTree, names: Sequence[str], model: str) -> tuple[dict, dict, dict]:
-    """Links, joints and joints that are left out of a part of a tree, without the model's name."""
+    """Links, joints and left-out joints of one part of a tree; names are without the
+    model's name.
+    """
     prefix = f'{model}::' if model else ''
 
     def short(name: str) -> str:
@@ -116,7 +119,7 @@ def _named_within(tree: UrdfTree, names: Sequence[str], model: str) -> tuple[dic
 
 
 def _with_names(placements: Sequence[Placement]) -> list[Placement]:
-    """The dolls with names of their own: the second robot is robot_2."""
+    """The dolls with unique names: the second robot is robot_2."""
     names: list[str] = []
     for placement in placements:
         name, number = plain_name(placement.doll.name, 'robot'), 2

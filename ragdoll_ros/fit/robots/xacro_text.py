@@ -9,7 +9,7 @@ from ...model import errors
 
 
 def expand_xacro(path: Path) -> str:
-    """URDF of a xacro without arguments, each at its default. Its expressions are evaluated.
+    """URDF of a xacro file, with the default of each argument. Evaluates the file's expressions.
 
     Raises Unreadable: xacro is not installed, or refuses the file. OSError: it cannot be read.
     """

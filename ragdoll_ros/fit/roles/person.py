@@ -48,8 +48,8 @@ def is_person(roles: Sequence[str | None], positions: np.ndarray) -> bool:
 
 def has_persons_proportions(roles: Sequence[str | None], names: Sequence[str],
                             volumes: Sequence[float]) -> bool:
-    """Whether bodies of a person with these volumes have the proportions of one: those of chibi
-    figures and of monsters that are mostly head have not.
+    """Whether head and neck have no larger share of a person's volume than MAX_HEAD_SHARE. Chibi
+    figures, and monsters that are mostly head, exceed it.
     """
     head = sum(volume for role, name, volume in zip(roles, names, volumes, strict=True)
                if segment(role, name)[0] == 'head')

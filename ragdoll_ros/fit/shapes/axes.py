@@ -39,9 +39,10 @@ def fit_axes(points: np.ndarray, areas: np.ndarray, direction: np.ndarray,
     """Axes of a cluster of vertices (p, 3) m with ``areas`` (p,) m^2, doll's frame.
 
     z is the first principal axis, with the sign of the bone's unit ``direction`` (3,); it is the
-    direction itself for ``orientation`` 'bone' and for clusters below MIN_ELONGATION. x is the
-    second principal axis, with the sign that faces forward (else left); where it is ambiguous, the
-    perpendicular of z nearest to forward.
+    direction itself for ``orientation`` 'bone' and for clusters with an elongation below
+    MIN_ELONGATION. x is the first principal axis of the points projected along z, with the sign
+    that faces forward (else left); where it is ambiguous, the perpendicular of z nearest to forward
+    (left for z near forward).
     """
     deviations, vectors = principal_components(points, areas)
     elongation = 1 - deviations[1] / deviations[0] if deviations[0] > 1e-9 else 0.0

@@ -59,7 +59,8 @@ def fit_shape(points: np.ndarray, kind: str, thinnest: float, tolerance: float) 
 def fit_best(clusters: list[np.ndarray], thinnest: float, tolerance: float) -> list[FittedShape]:
     """Shapes of the same kind around clusters (p, 3) m, each in its own axes; see fit_shape.
 
-    The kind is the one with the smallest total volume.
+    The kind is the one with the smallest total volume, of those that contain MIN_COVERAGE of every
+    cluster if there are any.
     """
     def cost(fits: list[FittedShape]) -> tuple[bool, float]:
         return (min(fitted.coverage for fitted in fits) < MIN_COVERAGE,

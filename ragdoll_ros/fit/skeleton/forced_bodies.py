@@ -35,7 +35,7 @@ def find_forced_bodies(character: Character, patterns: Sequence[str],
 
 
 def _matching(names: tuple[str, ...], pattern: str) -> list[int]:
-    """The bone of exactly that name, else all bones whose names match."""
+    """Index of the bone of exactly that name, else of all bones whose names match the pattern."""
     if pattern in names:
         return [names.index(pattern)]
     return [int(bone) for bone in np.flatnonzero([fnmatchcase(name, pattern) for name in names])]

@@ -85,9 +85,10 @@ def group_bones(character: Character, roles: tuple[str | None, ...], clusters: l
     """Groups of a character's bones, parents first.
 
     ``roles`` and ``clusters`` are indexed by bone; parents are those of ``tree``. A bone whose
-    cluster is shorter than ``smallest`` m (None: MIN_CLUSTER_SIZE of the character) is merged into
-    its parent; so are a second bone of a limb segment or of the pelvis, a finger (unless
-    ``smallest`` is 0), and a ``swinging`` bone, without its cluster. A ``forced`` bone is not.
+    cluster, with those merged into it, is shorter than ``smallest`` m on both sides (None:
+    MIN_CLUSTER_SIZE of the character) is merged into its parent; so are a second bone of a limb
+    segment or of the pelvis, a finger (unless ``smallest`` is 0), and a ``swinging`` bone, without
+    its cluster. A ``forced`` bone is not.
     """
     clusters = clear_clusters(clusters, swinging)
     fingers = smallest == 0
@@ -176,7 +177,9 @@ def cluster_size(character: Character, vertices: np.ndarray) -> float:
 
 def _is_same_segment(character: Character, roles: tuple[str | None, ...], parent: int, bone: int,
                      fingers: bool) -> bool:
-    """Whether both bones belong to one limb segment, pelvis, or hand without ``fingers``."""
+    """Whether both bones belong to one limb segment or pelvis or, unless ``fingers``, to
+    one hand.
+    """
     above, role = roles[parent], roles[bone]
     if role == 'hips' and side_of(character.bone_names[bone]):
         return above in ('hips', 'spine')
@@ -185,7 +188,7 @@ def _is_same_segment(character: Character, roles: tuple[str | None, ...], parent
 
 
 def _mirrored_bone(character: Character, bone: int, level: list[int]) -> int:
-    """The bone of ``level`` on the other side, else the bone itself."""
+    """The bone, among ``level``, at the mirrored position of a bone; else the bone itself."""
     mirrored = character.positions[bone] * (1, -1, 1)
     distances = np.linalg.norm(character.positions[level] - mirrored, axis=1)
     nearest = int(np.argmin(distances))

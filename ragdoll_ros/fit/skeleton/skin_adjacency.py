@@ -32,10 +32,11 @@ class SkinAdjacency:
 
 
 def find_adjacency(character: Character) -> SkinAdjacency:
-    """Shared skin of all pairs of bones; an edge of the mesh counts by the weights at both ends.
+    """Shared skin of all pairs of bones.
 
-    So bones are adjacent where an edge connects their skins or where both move a vertex.
-    Coincident vertices, as at texture seams and between meshes, are connected by an edge.
+    Each edge of the mesh counts with its area times the weights at both ends. So bones are adjacent
+    where an edge connects their skins or where both move a vertex. Coincident vertices, as at
+    texture seams and between meshes, are connected by an edge.
     """
     ends, areas = _weighted_edges(character)
     middles = character.vertices[ends].mean(axis=1)

@@ -1,7 +1,7 @@
-"""Edges between the bones of a character, of its file and as shown by their skin.
+"""Edges between the bones of a character: those of its file, and those that its skin shows.
 
-First the edges of the file that can be: that the skin confirms, or whose joint lies in or near both
-bodies. Then the pairs that share most skin, then the nearest.
+Plausible edges of the file come first: the skin confirms them, or their joint lies in or near both
+bodies. Next are the pairs that share most skin, and last the nearest pairs.
 """
 import numpy as np
 
@@ -30,9 +30,10 @@ MIRROR_TOLERANCE = 0.02
 
 
 class SkinForest:
-    """The skinned bones of a character, by index; ``edges`` connect them until they form one tree.
+    """The skinned bones of a character, by index; joining adds ``edges`` until they form one tree.
 
-    ``halves`` are edges within one body, ``fixed`` those that nothing but the distance suggests.
+    ``halves`` are edges within one body. ``fixed`` are edges that neither file nor skin suggests,
+    to a part that is large or not near.
     """
 
     def __init__(self, character: Character, clusters: list[np.ndarray],
@@ -56,7 +57,9 @@ class SkinForest:
         self._tree_of = np.arange(len(clusters))
 
     def join_halves(self) -> None:
-        """Left and right bones that share much skin, or are both pelvis by name, are one body."""
+        """Join left and right bones to one body where they share much skin or are halves of the
+        pelvis.
+        """
         for bone in self.skinned:
             other = int(self.mirrored[bone])
             total = self.shared[bone].sum()
@@ -77,8 +80,8 @@ class SkinForest:
                 self._join(bone, parent)
 
     def join_shared_skin(self) -> None:
-        """Connect bones that share skin, the largest shared area first; no limb to its twin or to
-        another limb.
+        """Connect bones that share skin, the largest shared area first, but not mirrored bones, nor
+        an arm and a leg, nor limbs of two sides.
         """
         least = MIN_SHARED_AREA * np.minimum(self.areas[:, None], self.areas)
         pairs = [(a, b) for a, b in np.argwhere(np.triu(self.shared > least))
@@ -88,7 +91,9 @@ class SkinForest:
             self._join(int(a), int(b))
 
     def join_nearest(self) -> None:
-        """Connect the remaining trees: by an edge of the file if that is near, else the nearest."""
+        """Connect the remaining trees: by an edge of the file if it is about as short as the
+        shortest or no edge is short, else by the shortest.
+        """
         if len(self._trees()) == 1:
             return
         distances = cluster_distances(self.character, self.clusters)
@@ -120,9 +125,11 @@ class SkinForest:
             self._join(*edge)
 
     def _can_be(self, bone: int, parent: int) -> bool:
-        """Whether an edge of the file can be: the skin confirms it, or the bone's joint lies in or
-        near both; and no other bone is nearer to the joint and shares more skin, or as much where
-        the skin says nothing: a hand may hang beside the hips.
+        """Whether an edge of the file is plausible.
+
+        The skin confirms it, or the bone's joint lies in or near both bodies. And no other bone is
+        nearer to the joint and shares more skin, or as much where the skin does not confirm the
+        edge: a hand may hang beside the hips.
         """
         shared, off = self.shared[bone], self.joint_distances[bone]
         confirmed = shared[parent] > MIN_FILE_AREA * shared.max() > 0
@@ -185,7 +192,9 @@ class SkinForest:
         return mirrored
 
     def _is_pelvis(self, bone: int) -> bool:
-        """Whether it is named as hips, or is a thigh with a thigh below: half of the hips."""
+        """Whether a bone has the role of the hips, or is a thigh with a thigh below it: half of the
+        hips.
+        """
         below = [self.roles[k] for k in self.skinned
                  if self.skinned_parents[k] == bone and k != self.mirrored[bone]]
         return self.roles[bone] == 'hips' or (self.roles[bone] == 'thigh' and 'thigh' in below)

@@ -1,8 +1,8 @@
-"""Kinematic tree of a character: its file's where that can be, else from its skin.
+"""Kinematic tree of a character: its file's where that is plausible, else from its skin.
 
 Animation rigs parent feet and hands to the root or to nothing, have controls without skin, and may
-start at any bone. The edges are those of skin_forest.py; the root is in the trunk, the bone that
-balances them.
+start at any bone. The edges are those of skin_forest.py; the root is the bone of the trunk whose
+branches have the most even skin areas.
 """
 from dataclasses import dataclass
 
@@ -49,8 +49,8 @@ def find_skin_tree(character: Character, clusters: list[np.ndarray],
                    root: str | None = None) -> SkinTree:
     """Tree of a character's bones; ``clusters`` and ``roles`` are indexed by bone.
 
-    ``source``: one of TREES. ``root``: name of the root; None: found. Raises UnknownBone for a bone
-    that does not exist, WrongForm for one without skin.
+    ``source``: one of TREES. ``root``: name of the root; None: see _find_root. Raises UnknownBone
+    for a root that does not exist, WrongForm for one without skin.
     """
     if not any(len(cluster) for cluster in clusters):
         return SkinTree((-1, *(0 for _ in clusters[1:])), {}, frozenset(), frozenset())
@@ -83,8 +83,9 @@ def _named_root(forest: SkinForest, name: str) -> int:
 
 
 def _find_root(forest: SkinForest, source: str) -> int:
-    """The bone whose largest branch is smallest; a bone on the mirror plane if there is any. Of the
-    file's tree the largest of its roots.
+    """The bone whose largest branch is smallest, with ROOT_BONUS for the file's root and the hips.
+    Bones on the mirror plane come first, except neck and head. For ``source`` 'file': the largest
+    of the file's roots.
     """
     names, roles = forest.character.bone_names, forest.roles
     halves = {bone for pair in forest.halves for bone in pair}

@@ -162,7 +162,9 @@ def _remove_groups(groups: list[BodyGroup], removed: set[int]) -> list[BodyGroup
 
 def _spring(character: Character, links: dict[int, int], name: str, carrier: int,
             roots: list[np.ndarray], last: np.ndarray) -> SpringBone:
-    """Spring bone of the ``links`` of bones, to the far end of the ``last`` one's vertices."""
+    """Spring bone from ``roots`` (3,) m to the farthest of the vertices ``last``. ``links`` maps
+    bones to segments; the chain hangs on the bone ``carrier``.
+    """
     points = character.vertices[last]
     tip = points[np.argmax(np.linalg.norm(points - roots[-1], axis=1))]
     joint = SpringJoint(DEFAULT_STIFFNESS / character.scale, 0.0, DEFAULT_DRAG)

@@ -66,7 +66,9 @@ def _assign_characters(character: Character, islands: np.ndarray) -> np.ndarray:
 
 
 def _connected_components(character: Character) -> np.ndarray:
-    """Label (n,) of each bone's component, connected by the file's tree or by skin; 0 if one."""
+    """Label (n,) of each bone's component, connected by the file's tree or by skin; all 0 if there
+    is only one.
+    """
     found = np.arange(len(character.parents))
     pairs = [*((bone, up) for bone, up in enumerate(character.parents) if up >= 0),
              *np.argwhere(find_adjacency(character).shared_area > 0)]

@@ -24,7 +24,7 @@ TRANSFORM = ('matrix', 'translation', 'rotation', 'scale')
 
 def add_character(animation: GltfAnimation, copied: CopiedFile, skeleton: FileSkeleton,
                   bones: Pose, name: str) -> int:
-    """Add a character and its motion; the node of its doll.
+    """Add a character and its motion. Returns the index of its doll's node.
 
     Args:
         animation: of the recording.
@@ -60,9 +60,9 @@ def add_character(animation: GltfAnimation, copied: CopiedFile, skeleton: FileSk
 
 
 def _meshes(copied: CopiedFile, skeleton: FileSkeleton, base: int) -> dict[int, dict[str, int]]:
-    """``mesh`` and ``skin`` of the nodes that have a part of the doll's skin.
+    """Return ``mesh`` and ``skin`` of the nodes that have a part of the doll's skin.
 
-    A mesh without a skin is part of it if it is below a bone.
+    A mesh without a skin belongs to that skin if its node is a bone of the skeleton or below one.
     """
     source, own = skeleton.source, set(skeleton.nodes)
     below = set(own)

@@ -27,11 +27,11 @@ ACCESSOR_KEYS = ('name', 'componentType', 'type', 'count', 'byteOffset', 'normal
 
 
 class CopiedFile:
-    """Copies entries of ``file`` into ``glb``, each once; methods return the new index.
+    """Copies entries of ``file`` into ``glb``, each once but skins; methods return the new index.
 
     Materials keep their extensions; meshes keep all their attributes and morph targets. Broken
-    textures are left out, as no character is refused for its appearance. Methods raise a ModelError
-    for anything else that is broken.
+    textures and materials of meshes are left out, as no character is refused for its appearance.
+    Methods raise a ModelError for anything else that is broken.
     """
 
     def __init__(self, glb: Glb, file: GltfFile) -> None:
@@ -50,7 +50,9 @@ class CopiedFile:
         return self._once('materials', index, lambda entry, _: self._textured(entry))
 
     def skin(self, index: object, base: int) -> int:
-        """Add a skin, whose joints are nodes ``base`` after the file's."""
+        """Add a skin. Its joints are the file's nodes, each at its index in the file plus
+        ``base``.
+        """
         entry, where = self._entry('skins', index), f'skins[{index}]'
         given = entry.get('inverseBindMatrices')
         made = {key: entry[key] for key in ('name', 'extras') if key in entry}
@@ -70,7 +72,9 @@ class CopiedFile:
         return self._once('meshes', index, copied, () if own is None else own.tobytes())
 
     def add(self, kind: str, where: str, entry: dict) -> int:
-        """Add an entry of the file's ``where``, and the extensions that it uses."""
+        """Add an entry to the list ``kind``, and the extensions that it uses; ``where`` is its
+        place in the file.
+        """
         try:
             json.dumps(entry, allow_nan=False)
         except ValueError as error:
@@ -103,7 +107,9 @@ class CopiedFile:
                 for name, accessor in get_container(given, key, dict, where).items()}
 
     def _own_corners(self, given: dict, where: str, own: np.ndarray) -> np.ndarray:
-        """Corners of the triangles all of whose vertices one of a skin's ``own`` joints moves."""
+        """Return the corners of those triangles of which each vertex is moved by one of a skin's
+        ``own`` joints.
+        """
         if get_count(given, 'mode', where, TRIANGLES) != TRIANGLES or DRACO in get_container(
                 given, 'extensions', dict, where):
             raise errors.WrongForm(where, 'a strip, a fan or Draco compression',

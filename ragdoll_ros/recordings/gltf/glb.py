@@ -11,7 +11,7 @@ ATTRIBUTES, INDICES = 34962, 34963
 
 
 class Glb:
-    """``document`` is its JSON; the methods return the index of what they add."""
+    """Builds a .glb file. ``document`` is its JSON; methods that add something return its index."""
 
     def __init__(self) -> None:
         self.document: dict = {'asset': {'version': '2.0', 'generator': 'ragdoll_ros'}}

@@ -29,12 +29,12 @@ CREASE = math.radians(40)
 
 
 def gltf_bytes(recording: Recording, warn: Callable[[str], None] = warnings.warn) -> bytes:
-    """A recording as a .glb file.
+    """Return a recording as a .glb file.
 
     Numbers are float32, so each doll's node is at the middle of its motion, rounded to metres:
-    within 16 m positions are exact to 1e-6 m. Of swings only what hangs on their links in a
+    within 16 m positions are exact to 1e-6 m. Of swings, only what hangs on their links in a
     character's file is written. ``warn`` receives a sentence for each doll whose character's file
-    can not be read: its bones' shapes are written.
+    can not be read; instead of the character, the shapes of its bones are written.
     """
     glb = Glb()
     animation = GltfAnimation(glb, recording.times)
@@ -63,7 +63,9 @@ def gltf_bytes(recording: Recording, warn: Callable[[str], None] = warnings.warn
 
 def _add_shapes(animation: GltfAnimation, shapes: '_Shapes', doll: Ragdoll, bones: Pose,
                 name: str) -> int:
-    """Add a doll's bones with their shapes and their motion (k, b or more); the doll's node."""
+    """Add a doll's bones with their shapes and their motion (k, b or more). Returns the index of
+    the doll's node.
+    """
     bones = bones.at(np.arange(len(doll.bones)))
     positions, orientations = points_y_up(bones.position), continuous(
         orientations_y_up(bones.orientation))
@@ -109,10 +111,10 @@ class _Shapes:
 
 
 def crease_normals(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (3t, 3) m, three to each of ``triangles`` (t, 3), and their unit normals.
+    """Return vertices (3t, 3) m, three to each of ``triangles`` (t, 3), and their unit normals.
 
-    A normal is the mean, weighted by area, of those of the faces around the vertex within CREASE of
-    its own face's. Degenerate faces are left out.
+    A vertex of a face has as normal the mean, weighted by area, of the normals of those faces
+    around it that are within CREASE of the face's own. Degenerate faces are left out.
     """
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -67,7 +67,7 @@ def _primitives(glb: Glb, skin: Skin, directions: dict[str, np.ndarray]) -> list
 
 
 def _add_materials(glb: Glb, appearance: Appearance) -> list[int]:
-    """Add materials with their textures; their indices."""
+    """Add materials with their textures. Returns their indices."""
     textures = []
     for texture in appearance.textures:
         image = glb.add('images', bufferView=glb.view(texture.image), mimeType=texture.kind)
@@ -78,7 +78,9 @@ def _add_materials(glb: Glb, appearance: Appearance) -> list[int]:
 
 
 def _with_textures(glb: Glb, entry: dict, textures: list[int]) -> dict:
-    """A material with the file's indices of textures; adds its extensions to extensionsUsed."""
+    """Return a material with ``glb``'s indices of textures; adds its extensions to
+    extensionsUsed.
+    """
     made = {}
     for key, value in entry.items():
         made[key] = _with_textures(glb, value, textures) if isinstance(value, dict) else value
@@ -91,7 +93,9 @@ def _with_textures(glb: Glb, entry: dict, textures: list[int]) -> dict:
 
 
 def smooth_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (v, 3): the triangles' mean around each vertex, weighted by area; else z."""
+    """Return unit normals (v, 3): around each vertex the mean of the triangles' normals, weighted
+    by area; the z axis where there is none.
+    """
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sums = np.stack([np.bincount(triangles.ravel(), np.repeat(component, 3), len(vertices))

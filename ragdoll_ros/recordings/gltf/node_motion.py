@@ -1,7 +1,7 @@
 """Local transforms over time of the nodes of a character's file, as its doll carries its bones.
 
-From the top down, each bone is placed in its parent as it is written, with 32 bits: so errors of
-rounding do not add up along a limb.
+From the top down, each bone is placed in its parent as the parent is written, with 32 bits. So
+rounding errors do not add up along a limb.
 """
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class LocalMotion:
 
     @property
     def matrices(self) -> np.ndarray:
-        """(k, 4, 4) from the node to its parent."""
+        """Transforms (k, 4, 4) from the node's frame to its parent's."""
         found = np.zeros((len(self.rotation), 4, 4))
         found[:, :3, :3] = rotation.matrix(rotation.normalized(self.rotation.astype(float)))
         found[:, :3, :3] *= self.scale
@@ -55,10 +55,11 @@ class LocalMotion:
 
 
 def doll_node(skeleton: FileSkeleton, places: np.ndarray) -> LocalMotion:
-    """Transform of the node above all of the file's: units and axes.
+    """Return the transform of the doll's node above all nodes of the file: units and axes.
 
-    It takes the parent of the first bone to the middle of the bones' ``places`` (k, n, 3) m, Y up,
-    to whole metres: a bone is written in its parent, with 32 bits, so that it should be near it.
+    It places the parent of the first bone at the middle of the bones' ``places`` (k, n, 3) m, Y up;
+    its translation is rounded to whole metres. A bone is written relative to its parent, with 32
+    bits, so the parent should be near it.
     """
     matrix = np.eye(4)
     matrix[:3, :3] = points_y_up(skeleton.to_doll[:3, :3].T).T
@@ -73,12 +74,12 @@ def doll_node(skeleton: FileSkeleton, places: np.ndarray) -> LocalMotion:
 
 def bone_motions(skeleton: FileSkeleton, poses: Pose,
                  root: LocalMotion) -> dict[int, tuple[bool, LocalMotion]]:
-    """Whether a bone moves in its parent, and its motion there, by its node.
+    """Return whether each bone moves in its parent, and its motion there, by its node.
 
     Args:
         skeleton: of the file.
         poses: (k, n) of its bones, world frame.
-        root: of the node above all of the file's.
+        root: transform of the node above all of the file's.
 
     Raises:
         WrongForm: a node above a bone has a scale of zero.

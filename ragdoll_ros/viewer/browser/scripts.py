@@ -1,7 +1,7 @@
-"""Loads the scripts and style sheets of this folder, and receives the events that scripts send.
+"""Loads the scripts and style sheets of this folder, and receives events that scripts send.
 
-Viser has no call for either, and <script> elements in the panel's HTML do not run; the error
-handler of an image that cannot be loaded does, whenever the panel is shown.
+Viser has no call for either. <script> elements in the panel's HTML do not run, but the error
+handler of an image that cannot be loaded runs, each time the panel is shown.
 """
 from __future__ import annotations
 

@@ -35,7 +35,8 @@ class AutoFollow:
                velocity: np.ndarray) -> None:
         """Take note of the newest frame, with a doll at ``center`` (3,) m, ``velocity`` (3,) m/s.
 
-        That a user turns the camera away from it, or drags it, does not count.
+        *Follow* stays off if the doll leaves the view because a user turns the camera or drags the
+        doll.
         """
         self._is_own &= self._checkbox.value
         if frame.time < self._time and self._is_own:
@@ -47,7 +48,7 @@ class AutoFollow:
             self._checkbox.value = self._is_own = True
 
     def _leaves(self, clients: dict[int, viser.ClientHandle], places: np.ndarray) -> bool:
-        """Whether a page's camera that has not moved sees all places (m, 3) m no longer."""
+        """Whether a page's camera that has not moved no longer sees all ``places`` (m, 3) m."""
         before, self._seen = self._seen, {}
         result = False
         for page, client in clients.items():

@@ -1,8 +1,8 @@
-"""The bones, as instanced meshes: parts of one shape form batches, so that many cost little. The
-hulls of a bone are a batch.
+"""The bones, as instanced meshes: parts of one shape form batches, so many parts are cheap. All
+hulls of a bone form one batch.
 
-A batch in which nothing has moved is not sent: among a thousand resting dolls one that moves costs
-only the batches that it is in.
+A batch in which nothing has moved is not sent: one doll that moves among a thousand resting dolls
+costs only the batches that contain it.
 """
 from __future__ import annotations
 
@@ -91,8 +91,9 @@ class Bodies:
 
     def _batch(self, name: str, chunk: list[tuple[int, Part]], skinned: bool, colors: np.ndarray,
                state: State, mesh: Mesh | None = None) -> Batch:
-        """A batch of parts of one shape, each with the index of its bone, in ``colors`` (p, 3); of
-        hulls ``mesh`` is what is drawn.
+        """Make a batch of parts of one shape, each with its bone's index, in ``colors`` (p, 3).
+
+        ``mesh``: what is drawn; required for hulls, else by default that of the parts' kind.
         """
         bones = np.array([index for index, _ in chunk])
         parts = [part for _, part in chunk]
@@ -125,7 +126,7 @@ class Bodies:
 
 
 def linear(colors: np.ndarray) -> np.ndarray:
-    """Light of colours in sRGB, 0 to 1: what viser takes the colours of batches for."""
+    """Convert colours from sRGB, 0 to 1, to linear light, which viser expects for batches."""
     return np.where(colors > 0.04045, ((colors + 0.055) / 1.055) ** 2.4, colors / 12.92)
 
 

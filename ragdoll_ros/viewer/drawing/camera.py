@@ -69,7 +69,9 @@ class Cameras:
         server.on_client_connect(self._on_connect)
 
     def show(self, frame: Frame) -> None:
-        """Take note of a drawn frame: frame another scene, or a start that is out of view."""
+        """Take note of a drawn frame: show the home view of another scene, or of a start that is
+        out of view.
+        """
         before, self._frame = self._frame, frame
         if before is None or _scene_key(before) != _scene_key(frame):
             spheres = bounding_spheres(frame.scene, frame.state)
@@ -101,7 +103,10 @@ class Cameras:
         camera.far = max(FAR, 3 * float(np.linalg.norm(position - look_at)))
 
     def follow(self, frame: Frame, bone: int, now: float, follow: bool) -> None:
-        """Follow the doll of a bone at ``now`` s of a steady clock, or return to former views."""
+        """Follow the doll of a bone if ``follow``, else return to the views before following.
+
+        ``now``: s of a steady clock.
+        """
         self._bone = bone
         is_due = now >= self._next_move
         if is_due:
@@ -130,7 +135,7 @@ class Cameras:
     def _on_connect(self, client: viser.ClientHandle) -> None:
         """Show the home view to a new page, and again when its window is resized while in it.
 
-        Viser may apply its initial camera after that.
+        Viser may apply its initial camera later; then the home view is shown again, too.
         """
         @client.camera.on_update
         def _(camera: viser.CameraHandle) -> None:

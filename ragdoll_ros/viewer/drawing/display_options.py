@@ -47,7 +47,7 @@ class DisplayOptions:
                 hint='The bodies that move the skin, translucent')
 
     def on_home(self, callback: Callable[[viser.ClientHandle], None]) -> None:
-        """Call this with each page that asks for the home view."""
+        """Call ``callback`` with each page that asks for the home view."""
         for trigger in (self._home.on_click, self._home_key.on_trigger):
             trigger(lambda event: event.client and callback(event.client))
 

@@ -27,7 +27,8 @@ MIN_DISTANCE = 2.5
 def bounding_spheres(scene: Scene, state: State) -> tuple[np.ndarray, np.ndarray]:
     """Centres (m, 3) m, world frame, and radii (m,) m of spheres around each bone.
 
-    With a ground, also around each bone at its projection onto that, where it will fall.
+    With a ground, also the same spheres moved along its normal until they touch it, where the bones
+    will fall.
     """
     radii = np.array([np.linalg.norm(bone.shape.half_extents) for bone in scene.bones])
     if scene.ground is None:
@@ -63,7 +64,10 @@ def home_position(centres: np.ndarray, radii: np.ndarray, look_at: np.ndarray, f
 
 def sees_all(position: np.ndarray, look_at: np.ndarray, fov: float, aspect: float,
              centres: np.ndarray, radii: np.ndarray) -> bool:
-    """Whether a camera at ``position`` (3,) m, looking at ``look_at`` (3,) m, sees all spheres."""
+    """Whether a camera at ``position`` (3,) m, looking at ``look_at`` (3,) m, sees all spheres.
+
+    False for a camera that looks straight up or down.
+    """
     gaze = look_at - position
     length = np.linalg.norm(gaze)
     right = np.cross(gaze, (0.0, 0.0, 1.0))

@@ -19,7 +19,8 @@ SHARE, LARGEST = 0.8, 2.0
 
 
 def joint_balls(scene: Scene) -> list[tuple[int, int, Part]]:
-    """Index of the parent bone, in whose frame the ball is, index of the child, and the ball.
+    """List for each ball the index of the parent bone, in whose frame the ball is, the index of the
+    child, and the ball.
 
     A joint far from one of its bones has none, nor has a scene with more than MOST joints.
     """

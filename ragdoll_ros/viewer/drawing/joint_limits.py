@@ -1,6 +1,6 @@
-"""Joint limits: an arc over the range of each limited angle, and a needle at the current angle.
+"""Joint limits: an arc over the range of each limited angle, with a needle at its value.
 
-For a ball joint also the cone that its two swing limits define, a pyramid.
+For a ball joint with two swing limits also their cone, which has the shape of a pyramid.
 """
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def faceted(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
 
 
 def soft_box() -> Mesh:
-    """A box with edges of 1 m that are shaded as round."""
+    """A box with edges of 1 m, shaded as if its edges were rounded."""
     corners, _ = box()
     outer, shared = np.unique(corners, axis=0, return_inverse=True)
     inner = corners.copy()

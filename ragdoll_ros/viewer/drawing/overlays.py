@@ -1,4 +1,4 @@
-"""Lines, arrows and points for swings, pushes, hands and contacts."""
+"""Lines, arrows and points for swings, pushes, hands, contacts and impacts."""
 from __future__ import annotations
 
 import time
@@ -36,7 +36,10 @@ MIN_PUSH_DISPLAY = 0.3
 
 
 class Overlays:
-    """Draws what is not a body or skin; each kind gets its node when it is first needed."""
+    """Draws swings, pushes, hands, contacts and impacts.
+
+    Each kind gets its scene node when it is first needed.
+    """
 
     def __init__(self, server: viser.ViserServer) -> None:
         add = server.scene
@@ -65,7 +68,7 @@ class Overlays:
         self._last_push = 0.0
 
     def show(self, frame: Frame, rods: np.ndarray | None = None) -> None:
-        """Draw what a frame has, of its rods these (m, 2, 3) m, and hide the rest."""
+        """Draw the overlays of a frame, with ``rods`` (m, 2, 3) m of its swings; hide the rest."""
         scene, state = frame.scene, frame.state
         now = time.monotonic()
         pushes = tuple(push for push in frame.pushes if any(push.force))
@@ -90,7 +93,7 @@ class Overlays:
                     [arrow.text for arrow in impacts])
 
     def _label(self, kind: str, tips: np.ndarray, texts: Sequence[str]) -> None:
-        """Write the texts at the tips (k, 3) m of arrows that are apart, the first ones first."""
+        """Write the texts at those tips (k, 3) m of arrows that `apart` selects."""
         labels, labelled = self._labels[kind], apart(tips)
         while len(labels) > len(labelled):
             labels.pop().remove()
@@ -117,10 +120,10 @@ class Overlays:
 
 
 def force_arrows(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
-    """Tails and tips (k, 2, 3) m of the contact forces, and these (k,) N, the largest first.
+    """Tails and tips (k, 2, 3) m of force arrows, and the forces (k,) N, the largest first.
 
-    One for all contact points of a bone with another, with a static body or with the ground, at
-    their centre of pressure. None where forces are unknown, or below LEAST_FORCE.
+    One arrow for all contact points of a bone with another, with a static body or with the ground,
+    at their centre of pressure. None where forces are unknown, or below LEAST_FORCE.
     """
     if frame.forces is None or not len(frame.forces):
         return np.zeros((0, 2, 3)), np.zeros(0)
@@ -141,7 +144,10 @@ def force_arrows(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
 
 
 def apart(tips: np.ndarray) -> list[int]:
-    """Indices of those tips (k, 3) m, at most MOST_LABELS, that are LABEL_GAP from all before."""
+    """Indices of at most MOST_LABELS tips (k, 3) m, each LABEL_GAP or more from those before.
+
+    A tip that is too near is skipped, and does not count for later ones.
+    """
     found: list[int] = []
     for index, tip in enumerate(tips):
         if all(np.linalg.norm(tip - tips[other]) >= LABEL_GAP for other in found):

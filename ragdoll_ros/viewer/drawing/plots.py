@@ -59,7 +59,7 @@ class Plots:
             self._seen_by.discard(client.client_id)
 
     def _take(self, page: int, text: str) -> None:
-        """Take note of whether a page has the plots in view; of viser's thread."""
+        """Take note of whether a page has the plots in view; called in viser's thread."""
         if text == 'seen':
             self._seen_by.add(page)
             self._next = 0.0
@@ -69,8 +69,8 @@ class Plots:
     def add(self, frame: Frame, instant: float, status: SourceStatus, now: float) -> None:
         """Add points for a frame at an ``instant`` of the timeline, s.
 
-        ``now`` is s of a steady clock. A reset begins a run; another scene, or a recording from its
-        start, begins the timeline and clears the plots.
+        ``now`` is s of a steady clock. A reset begins a run. Another scene, which begins the
+        timeline, or any move back in a recording clears the plots.
         """
         last = self._last
         if last is None or frame.scene is not last.scene or frame.run != last.run or (
@@ -116,7 +116,7 @@ class Plots:
         self._new.clear()
 
     def _begin(self, frame: Frame, instant: float, now: float) -> None:
-        """Begin a run of plots, of another scene if that is another one."""
+        """Begin a run of the plots; a new scene or an earlier instant clears them."""
         self._add_gaps()
         is_new_scene = self._last is None or frame.scene is not self._last.scene
         clear = is_new_scene or instant < self._instant
@@ -144,7 +144,10 @@ class _Plot:
             scales={'x': uplot.Scale(time=False)})
 
     def add(self, instant: float, *row: float) -> None:
-        """Add one point to each line: simulated time in s, then values; ignored if not finite."""
+        """Add one point to each line. ``row``: simulated time in s, then the values.
+
+        A row that is not finite, or an instant not later than the last one, is ignored.
+        """
         if not np.isfinite(row).all() or (self._rows and instant <= self._rows[-1][0]):
             return
         self._rows.append((instant, self._run, *row))
@@ -174,10 +177,10 @@ class _Plot:
 
 
 def thinned(rows: np.ndarray, columns: int) -> np.ndarray:
-    """Rows (k, w), of ascending first values, without those that a picture does not show.
+    """Return rows (k, w), of ascending first values, but those a picture does not show.
 
-    Its width is divided into equal columns. In each remain the rows with the smallest and the
-    largest value of each line, the first row and the last.
+    The picture's width is divided into equal columns. In each column, the rows with the smallest
+    and largest value of each line are kept; so are the first and last row of all.
     """
     if len(rows) <= 2 * columns:
         return rows

@@ -28,8 +28,8 @@ the next one lacks, and draw nothing."""
 class SkinMeshes:
     """Skins of the first MAX_SKINS dolls of a scene that have one.
 
-    ``notes``: on skins that failed or are too many; ``skinned``: bones of dolls with a skin mesh;
-    ``links``: those of swings that move one.
+    ``notes``: on skins that failed or are too many; ``skinned``: indices of the bones of dolls with
+    a skin mesh; ``links``: indices of the links of swings that move one.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:

@@ -106,7 +106,9 @@ def draw_ground(server: viser.ViserServer, scene: Scene, dark: bool) -> None:
 
 
 def draw_static_bodies(server: viser.ViserServer, scene: Scene) -> None:
-    """Draw the static bodies: their parts of one kind in one batch, and each surface and plane."""
+    """Draw the static bodies: all primitives of one kind in one batch, and the hulls of a body, a
+    surface or a plane in a mesh each.
+    """
     parts = [(part, body.color or DEFAULT_COLOR)
              for body in scene.bodies for part in body.primitives]
     for kind in MESHES:
@@ -141,10 +143,10 @@ def draw_static_bodies(server: viser.ViserServer, scene: Scene) -> None:
 
 
 def configure_lights(server: viser.ViserServer) -> None:
-    """A main light with shadows, one from behind, and the light of sky and ground.
+    """Add a main light with shadows, one from behind, and the light of sky and ground.
 
-    In place of viser's, whose light from above leaves dark what is seen from the front, and whose
-    reflections of a city cost every page 0.2 MB and, without a GPU, 8 s.
+    They replace viser's lights, which shine from above and leave the front dark, and its
+    reflections of a city, which cost every page 0.2 MB and, without a GPU, 8 s.
     """
     scene = server.scene
     scene.configure_default_lights(enabled=False)

@@ -94,7 +94,10 @@ def read_bone(scene: Scene, name: str) -> FormValues:
 
 
 def read_bones(scene: Scene, names: Sequence[str]) -> FormValues:
-    """Values of one bone, or those that several share; MIXED where they differ."""
+    """Values of one bone, or those that several share; MIXED where they differ.
+
+    A colour that differs is left out.
+    """
     each = [read_bone(scene, name) for name in names]
     if len(each) == 1:
         return each[0]
@@ -107,9 +110,10 @@ def read_bones(scene: Scene, names: Sequence[str]) -> FormValues:
 
 def apply_values(scene: Scene, name: str, values: Mapping[str, FieldValue], limb: bool = False,
                  found: Sequence[errors.ModelError] = ()) -> Scene:
-    """Set a bone and its joint to the values. ``limb``: see changes.py; moves come first.
+    """Set a bone and its joint to the values, the bone first. ``limb``: see changes.py.
 
-    Raises ModelErrors with all errors, also those already ``found``; their paths are field keys.
+    Raises ModelErrors with all errors, also those already ``found``; their paths are keys of
+    fields.
     """
     shown, found = read_bone(scene, name), list(found)
     new = {**shown, **values}
@@ -215,7 +219,7 @@ def _set_axes_and_limits(scene: Scene, name: str, new: FormValues, shown: FormVa
 
 
 def _orthogonalized(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:
-    """The second axis, made perpendicular to the first where it is so but for rounding."""
+    """Make the second axis perpendicular to the first if it is so up to rounding."""
     cosine = float(np.dot(first, second))
     if not 1e-7 < abs(cosine) < 1e-4:
         return second
@@ -286,7 +290,7 @@ def _quaternion(degrees: tuple[float, ...]) -> np.ndarray:
 
 
 def _check_range(key: str, value: FieldValue | None) -> None:
-    """Raise OutOfRange for values that no engine handles; the model checks for finite ones."""
+    """Raise OutOfRange for values that no engine handles; the model refuses NaN and infinity."""
     for number in value if isinstance(value, tuple) else (value,):
         if key in MAXIMA and isinstance(number, float) and math.isfinite(number):
             if abs(number) > MAXIMA[key]:

@@ -104,7 +104,9 @@ def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
 
 
 def set_no_collision(scene: Scene, name: str, others: Sequence[str]) -> Scene:
-    """Let a bone not collide with these bones of its doll, beside those that joints connect."""
+    """Set the bones of its doll with which a bone does not collide, beside those that joints
+    connect.
+    """
     placement, bone = find(scene, name)
     doll = placement.doll
     before = [pair for pair in doll.no_collision if bone.name in pair]
@@ -133,7 +135,10 @@ def set_size(scene: Scene, name: str, half_extents: Sequence[float]) -> Scene:
 
 
 def set_shape(scene: Scene, name: str, kind: str) -> Scene:
-    """Change the kind of a body's shape, keeping its box, with the longest side along z."""
+    """Change the kind of a body's shape, fitted to its bounding box; see `shape_within`.
+
+    A cylinder or capsule is rotated so that its z axis is along the longest side.
+    """
     _, bone = find(scene, name)
     if kind not in SHAPES:
         raise errors.WrongForm(f'{name}.shape', kind, 'one of ' + ', '.join(SHAPES))

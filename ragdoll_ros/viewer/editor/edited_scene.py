@@ -73,7 +73,10 @@ class EditedScene:
         self._step(self.history.redo, self.history.undo, pause)
 
     def restart(self, scene: Scene, pause: bool, resume_if_refused: bool = False) -> None:
-        """Restart the source with a scene, paused or as it was; a refused one is not pending."""
+        """Restart the source with a scene, paused if ``pause``, else as it was.
+
+        A refused scene is not pending; the source then resumes if ``resume_if_refused``.
+        """
         with self.lock:
             self._pending.append(scene)
         if pause:

@@ -86,7 +86,8 @@ class Editor:
     def select(self, bone: str | None, add: bool = False) -> None:
         """Select a bone by its name in the scene; an unknown name or None deselects all.
 
-        ``add``: besides those that are selected; one that is selected is deselected.
+        ``add``: keep other selected bones, and deselect this one if it is selected; an unknown name
+        or None then changes nothing.
         """
         with self._display_lock:
             bones = (bone,) if bone in self.scene.bone_names else ()
@@ -124,7 +125,8 @@ class Editor:
     def update_paused(self, paused: bool, was_editing: bool = True) -> None:
         """Take note whether the source is paused: if it was resumed elsewhere, editing ends.
 
-        ``was_editing``: before that was asked; else it tells how it was before editing.
+        ``was_editing``: whether editing had begun before ``paused`` was read; if not, ``paused`` is
+        the state before editing, and does not end it.
         """
         if self._was_paused and not paused and was_editing and self.editing:
             self._set_editing(False)
@@ -169,7 +171,9 @@ class Editor:
             form.fill(bone_form.read_bone(change(self.scene, name, kind), name), changed=True)
 
     def show_handles(self) -> None:
-        """Show handles on the selected bone while editing, otherwise none."""
+        """While editing, show handles on the selected bone or static body, or outlines of several
+        bones; otherwise none.
+        """
         with self._display_lock:
             if self.editing and self.static:
                 self.handles.show(static_bodies.stand_in(self.scene, self.static),
@@ -247,7 +251,7 @@ class Editor:
             self._in_order.submit(self.toggle)
 
     def _on_enter(self, field: str) -> None:
-        """Apply the field's form, or add what it names."""
+        """Apply the form of a field in which Enter was pressed, or add what the field names."""
         if self.panel.has(field):
             self._enter_form()
         elif field == handle_id(self.panel.name):
@@ -258,7 +262,7 @@ class Editor:
             self.on_other_enter(field)
 
     def _enter_form(self) -> None:
-        """Apply what the form has at this moment: it may be typed further meanwhile."""
+        """Apply the current content of the form in another thread, while a user may type on."""
         with self._display_lock:
             self._waiting += 1
             self._in_order.submit(self._apply_next, *self._typed())
@@ -296,7 +300,10 @@ class Editor:
 
     def _change(self, change: Callable[[Scene, str], Scene], action: str,
                 bones: tuple[str, ...]) -> None:
-        """Change bones, on both sides if so chosen, as one step; if refused, reset the handles."""
+        """Change bones, on both sides if so chosen, as one step; if refused, reset the handles.
+
+        Without bones, change the selected static body.
+        """
         with self._reporting_errors():
             scene = self.scene
             try:

@@ -36,10 +36,11 @@ def partner(scene: Scene, name: str) -> str:
 
 
 def mirrored(scene: Scene, name: str, whole_limb: bool = False) -> Scene:
-    """Make the bone on the other side (and its limb) and its joint the mirror image of this one.
+    """Make the bone on the other side (and its limb) and its joint mirror images of this one.
 
     The mirror plane passes through the centre of the root, normal to the doll's y axis. Names,
-    colours, parents, and the signs of a partner's joint axes stay; swings are not mirrored.
+    colours and parents stay. So do the signs of a partner's joint axes if its kind is the same, but
+    not for a ball joint with two axes. Swings are not mirrored.
     """
     placement, bone = find(scene, name)
     names = limb(placement.doll, bone.name) if whole_limb else (bone.name,)

@@ -133,9 +133,9 @@ class EditorPanel:
         return {**body, **joint}, in_body + in_joint
 
     def show_errors(self, found: Iterable[errors.ModelError]) -> None:
-        """Show each error below its field; below the Update button others, and the fields' names.
+        """Show each error below its field, and the others below the Update button.
 
-        The button may be seen where the field is not.
+        The names of the fields are listed there, too, as the fields may be out of view.
         """
         found = list(found)
         self.body.show_errors(found)

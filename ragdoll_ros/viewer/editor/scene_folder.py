@@ -1,4 +1,4 @@
-"""The folder of the page's files; no other files can be read or written.
+"""The folder of the page's files; besides shipped files, no others can be read or written.
 
 Whoever reaches the page may send anything: invalid files and names raise a ModelError.
 """
@@ -103,7 +103,8 @@ class SceneFolder:
             progress: ProgressCallback) -> tuple[Scene, list[Verdict]]:
         """Scene of dolls fitted to the characters of an uploaded file, and a verdict on each.
 
-        The dolls hang above level ground and refer to the file, which is kept in this folder.
+        The dolls hang above level ground. They refer to the file, which is kept in this folder; a
+        URDF or SDF is not kept.
         """
         name = safe_name(name)
         suffix = Path(name).suffix.lower()
@@ -167,14 +168,14 @@ class SceneFolder:
                 raise errors.Unreadable(place, source, f'a file inside {self.path}')
 
     def _is_inside(self, name: str) -> bool:
-        """Whether a path from this folder leads to a file of it."""
+        """Whether a path, relative to this folder, is inside it; the file need not exist."""
         try:
             return (self.path / name).resolve().is_relative_to(self.path)
         except (ValueError, OSError, RuntimeError):
             return False
 
     def _keep(self, name: str, content: bytes) -> Path:
-        """Save a character, with a number in its name if another file has that name."""
+        """Save an uploaded file, with a number in its name if another file has that name."""
         path = Path(self.path, name)
         for number in range(2, 10_000):
             try:
@@ -219,7 +220,9 @@ def _listed(data: object, key: str) -> Iterator[tuple[str, dict]]:
 
 
 def safe_name(name: str) -> str:
-    """A file's name without folders, and with _ for all but letters, digits and ._- ."""
+    """A file's name without folders and leading dots, shortened to about 90 characters; others than
+    letters, digits, spaces, dots, - and _ are replaced by _.
+    """
     name = name.replace('\\', '/').rsplit('/', 1)[-1]
     stem, dot, suffix = ''.join(c if c.isalnum() or c in '._- ' else '_' for c in name)[-90:] \
         .strip().rpartition('.')

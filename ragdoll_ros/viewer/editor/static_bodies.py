@@ -128,7 +128,10 @@ def remove_body(scene: Scene, name: str) -> Scene:
 
 
 def _beside_first_doll(scene: Scene) -> np.ndarray:
-    """Where a new body begins and stands (3,) m: on the level ground, else at the doll's height."""
+    """Lowest x, middle y and lowest z (3,) m of a new body.
+
+    z is 0 with a ground, else that of the doll.
+    """
     x, y, z = scene.dolls[0].position
     return np.array((x + 1.5 * NEW_SIZE, y, z if scene.ground is None else 0.0))
 

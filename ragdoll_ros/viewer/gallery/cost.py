@@ -1,7 +1,8 @@
 """What a tick of a shipped scene costs on this machine, before the scene is loaded.
 
 costs.json has the cost of the busiest second of each scene, written by docs/gallery.py, and that of
-a short run of reference in the same units. The same short run here gives the ratio of the machines.
+a short reference run in the same units. The same reference run here gives the ratio of the
+machines.
 """
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ COSTS: dict[str, list[float]] = json.loads((FOLDER / 'costs.json').read_text('ut
 
 
 def reference_cost() -> float:
-    """Processor time of a tick of the run of reference, ms; takes about 0.1 s."""
+    """Processor time of a tick of the reference run, ms; takes about 0.1 s."""
     with Simulation(load_scene(REFERENCE_SCENE), engine='rigid') as simulation:
         simulation.advance()
         begin = time.thread_time()

@@ -73,7 +73,7 @@ class Gallery:
                            speed='slow' if is_slow else '')
 
     def _take(self, page: int, text: str) -> None:
-        """The cards are seen, or one was clicked."""
+        """Load the scene of a clicked card, or measure this machine once cards are seen."""
         if text in self._entries:
             self._load(self._server.get_clients().get(page), text)
         elif text == SEEN and not self._is_measuring:

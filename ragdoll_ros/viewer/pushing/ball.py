@@ -44,8 +44,8 @@ HINT = ('At what is clicked; the key T throws it at the pointer. The first time,
 class BallThrower:
     """A checkbox and the key T in the current GUI container; hidden for a recording.
 
-    ``frame`` gives the shown frame, or None where that is in the past; ``refuse`` tells a page so.
-    Where ``is_editing``, clicks select and nothing is thrown.
+    ``frame`` gives the shown frame, or None if that is in the past; then ``refuse`` tells the page.
+    While ``is_editing``, clicks select and nothing is thrown.
     """
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
@@ -60,7 +60,10 @@ class BallThrower:
                                                 visible=can_throw, hint=HINT)
 
     def connect(self, server: viser.ViserServer, hover: Hover) -> None:
-        """Let clicks throw, and the key T at a page's pointer or the middle of its picture."""
+        """Throw at clicks, and on the key T along a page's line of sight.
+
+        That is through the pointer, or the middle of the picture; see Hover.line_of_sight.
+        """
         if self._source.recording is not None:
             return
         hover.on_click = self._on_click
@@ -101,7 +104,10 @@ class BallThrower:
                                     f'The scene starts again with it.{flies}', auto_close_seconds=6)
 
     def update(self, frame: Frame, motion: Motion) -> None:
-        """Throw what waits, when it is known who falls; ``motion`` is that of the newest frame."""
+        """Throw a waiting ball once ``motion`` tells who falls, or at once while paused.
+
+        ``frame`` is the newest, ``motion`` that up to it.
+        """
         if self._pending is None or not has_ball(frame.scene):
             return
         if motion.knows_falling or self._source.status.paused:
@@ -147,7 +153,7 @@ class Target(NamedTuple):
     """Whether gravity accelerates it; else nothing does."""
 
     def at(self, time: float, scene: Scene) -> np.ndarray:
-        """Where it will be in ``time`` s, (3,) m: not below the ground."""
+        """Where the target will be in ``time`` s, (3,) m; a falling one stops on the ground."""
         place = self.position + self.velocity * time
         if self.falls:
             place += np.array(scene.gravity) * time ** 2 / 2
@@ -158,8 +164,8 @@ class Target(NamedTuple):
 
 
 def aim(frame: Frame, motion: Motion, origin: np.ndarray, direction: np.ndarray) -> Target:
-    """What a line of sight meets: a bone, else the ground, else the point at the distance of the
-    first doll. The ball itself is looked through. ``origin`` (3,) m, ``direction`` (3,).
+    """What a line of sight meets: a bone but the ball's, else the ground, else the point at the
+    distance of the first doll, RANGE or more. ``origin`` (3,) m, ``direction`` (3,).
     """
     unit = direction / np.linalg.norm(direction)
     names = [placement.name for placement in frame.scene.dolls]
@@ -183,8 +189,9 @@ def aim(frame: Frame, motion: Motion, origin: np.ndarray, direction: np.ndarray)
 
 def launch(scene: Scene, origin: np.ndarray,
            target: Target) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Position (3,) m and velocity (3,) m/s with which a ball meets ``target`` after the time t =
-    distance / SPEED: x = x0 + v t + g t^2 / 2. ``origin`` (3,) m: of the camera.
+    """Position (3,) m, RANGE or less from ``target``, and velocity (3,) m/s of a ball that meets it
+    after the time t = distance / SPEED: x = x0 + v t + g t^2 / 2. The distance is from the position
+    to ``target``. ``origin`` (3,) m: of the camera.
     """
     way = target.position - origin
     distance = max(float(np.linalg.norm(way)), 1e-6)

@@ -38,7 +38,7 @@ class Hover:
             self._labels.pop(client.client_id, None)
 
     def _take(self, page: int, text: str) -> None:
-        """A pointer has moved, clicked, or left the picture."""
+        """Take an event of pointer.js: a pointer has moved, clicked, or left the picture."""
         try:
             numbers = list(map(float, text.removeprefix('click ').split()))
         except ValueError:
@@ -58,7 +58,7 @@ class Hover:
     def show(self, frame: Frame, motion: Motion, now: float) -> None:
         """Label the bones of the shown frame below the pointers, at ``now`` s of a steady clock.
 
-        ``motion``: of the newest frame; a speed is told where that is the shown one.
+        ``motion``: that of the newest frame; labels tell speeds only if this frame is shown.
         """
         if now < self._next_update or not (self._pointers or self._labels):
             return

@@ -19,7 +19,7 @@ falls freely: then it is a rounding error, else contacts and hands make it as la
 
 
 class Motion:
-    """Velocities in the newest frame; zero before a second one. Not thread-safe."""
+    """Velocities in the newest frame; zero until there is a second frame. Not thread-safe."""
 
     def __init__(self) -> None:
         self._frames: deque[Frame] = deque()

@@ -137,9 +137,11 @@ class PushKeys:
         self._push_along(self._direction(client, arrows), TAP, TAP)
 
     def _push_along(self, direction: np.ndarray, response: float, duration: float) -> None:
-        """Push along ``direction`` (3,), for each key a unit vector, for ``duration`` s simulated.
+        """Push along ``direction`` (3,), the sum of the keys' unit vectors, for ``duration`` s
+        simulated.
 
-        The force is `strength` for each key, or what would give the top speed in ``response`` s.
+        The force is `strength` times the length of ``direction``, but at most the force that gives
+        the top speed in ``response`` s.
         """
         length, frame = float(np.linalg.norm(direction)), self.motion.frame
         if frame is None or length < 1e-9:  # opposite keys

@@ -117,7 +117,7 @@ class PlaybackSource(Source):
         return min(self._time + elapsed, self._recording.duration)
 
     def _note_time(self) -> None:
-        """Count from here on, without a gap: what follows changes how time passes."""
+        """Count time from the current instant on, as the next change alters how time passes."""
         wall = time.monotonic()
         self._time, self._since = self._at(wall), wall
 

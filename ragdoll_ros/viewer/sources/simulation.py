@@ -55,7 +55,8 @@ COMMAND_TIMEOUT = 60.0
 class SimulationSource(Source):
     """Simulates a scene in wall time while a page is open.
 
-    Pushes go to the first doll's root until another bone is chosen.
+    Until another bone is chosen, pushes go to the first doll's root, or if that is fixed to a bone
+    that hangs on it.
     """
 
     def __init__(self, scene: Scene, engine: str = 'auto') -> None:

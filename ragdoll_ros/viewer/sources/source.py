@@ -34,7 +34,7 @@ class GrabbedPoint:
 
 @dataclass(frozen=True)
 class Frame:
-    """All that is drawn, at one instant. What was not requested is None."""
+    """All that is drawn, at one instant. What was not requested may be None or empty."""
 
     scene: Scene
     """Compared by identity: another scene is another object."""
@@ -103,14 +103,17 @@ class RequestedData:
 
 
 class Source(Protocol):
-    """Provides frames and takes commands, from any thread; ignores commands it does not support."""
+    """Provides frames and takes commands, from any thread.
+
+    Ignores commands that it does not support, or refuses them with a RagdollError.
+    """
 
     @property
     def frame(self) -> Frame | None:
         """The newest frame, a new object for each instant; None before the first."""
 
     def take_frames(self) -> Sequence[Frame]:
-        """All frames since the last call, oldest first; some are lost after a long time."""
+        """All new frames since the last call, oldest first; the oldest of many are lost."""
 
     @property
     def recording(self) -> Recording | None:
@@ -136,7 +139,9 @@ class Source(Protocol):
         """Set which data the page needs from now on."""
 
     def push(self, force: Vector, duration: float) -> None:
-        """Push the pushed bone by N, world axes, for ``duration`` s simulated or until the next."""
+        """Push the pushed bone with ``force``, N, world axes, for ``duration`` s simulated or until
+        the next push.
+        """
 
     def push_bone(self, bone: str) -> None:
         """Let pushes act on another bone of the scene."""
@@ -172,8 +177,8 @@ class Source(Protocol):
         """Restart with a scene; waits; RagdollError with the reason if refused."""
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Hold a bone at ``point``, m, bone frame, and pull that to ``target``, m, world frame.
-        A point that is nowhere is ignored, as it is by `drag`.
+        """Hold a bone at ``point``, m, bone frame; pull this point to ``target``, m, world frame. A
+        point that is not finite is ignored, also by `drag`.
         """
 
     def drag(self, hand: str, target: Vector) -> None:
@@ -183,8 +188,8 @@ class Source(Protocol):
         """Release what a hand holds, if anything."""
 
     def set_state(self, doll: str, position: Vector, velocity: Vector) -> None:
-        """Put a doll's root somewhere, m, with a velocity, m/s, world frame, its axes along the
-        world's; joint angles stay.
+        """Set the ``position``, m, and ``velocity``, m/s, of a doll's root in the world frame, and
+        align its axes with the world's; joint angles stay.
         """
 
     def close(self) -> None:

@@ -38,7 +38,7 @@ def export_zip(recording: Recording) -> bytes:
 
 
 class ExportPanel:
-    """A button that sends files, and what they are to hold, in the GUI container that is current.
+    """A button that sends files, and fields for their content, in the current GUI container.
 
     ``clip`` gives the whole timeline, or None before the first frame. The choice is the same on all
     pages.
@@ -74,7 +74,7 @@ class ExportPanel:
         return clip.part(run[begin:end])
 
     def _show_times(self) -> None:
-        """Show the fields where they are used, at first with the last run's times."""
+        """Show the fields of times if a part is chosen, filled with the last run's times."""
         clip, is_part = self._clip(), self.choice.value == PART
         self.first.visible = self.last.visible = is_part
         if is_part and clip is not None:

@@ -64,7 +64,7 @@ class Clip:
                      int(starts[following]) if following < len(starts) else len(self.times))
 
     def part(self, indices: range) -> Clip:
-        """The frames of contiguous indices, of which there are some."""
+        """The frames of a range of contiguous indices, which must not be empty."""
         part, first = slice(indices.start, indices.stop), indices.start
         return Clip(self.times[part], lambda index: self.frame(first + index), self.pushed[part],
                     self.touching[part], self.resets[part], self.is_cut or first > 0)
@@ -102,8 +102,8 @@ class FrameBuffer:
         return self.end - float(self._rows['time'][0]) if self._frames else 0.0
 
     def add(self, frame: Frame) -> bool | None:
-        """Keep a frame, which must not be changed later; whether it is the first after a reset.
-        None if its instant is the last one's.
+        """Keep a frame, which must not be changed later. Return whether it is the first after a
+        reset, or None if it has the same instant as the last one.
         """
         last = self._frames[-1] if self._frames else None
         if last is not None and last.scene is not frame.scene:
@@ -131,7 +131,7 @@ class FrameBuffer:
 
     @property
     def _rows(self) -> np.ndarray:
-        """Of the frames that are kept."""
+        """Rows of ``_columns`` of the frames that are kept."""
         return self._columns[self._end - len(self._frames):self._end]
 
     def _clear(self) -> None:
@@ -171,8 +171,8 @@ class FrameBuffer:
 
 
 def has_contacts(frame: Frame) -> bool:
-    """Whether a source tells of contacts: with the ground, bodies or other dolls; also of bones of
-    one doll where it does not tell who touches whom.
+    """Whether a frame has contacts with the ground, static bodies or other dolls. Without
+    ``pairs``, contacts between bones of one doll count, too.
     """
     if frame.contacts is None or frame.pairs is None:
         return frame.contacts is not None and len(frame.contacts) > 0

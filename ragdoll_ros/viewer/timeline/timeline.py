@@ -15,7 +15,8 @@ class Timeline:
     """Keeps the source's frames with `add`; `frame_to_show` is what the page draws instead.
 
     Past frames come from a buffer: the source is not involved and continues. A reset or another
-    scene returns to the live frames. A recording has no past of its own: it is itself moved.
+    scene returns to the live frames. A recording needs no buffer: its source is moved to the chosen
+    instant.
     """
 
     def __init__(self, source: Source) -> None:
@@ -108,8 +109,8 @@ class Timeline:
                 playhead.go_to(position, time.monotonic())
 
     def go_to_time(self, simulated: float) -> str:
-        """Show the frame of a simulated time, s, of the run that is shown. If it is not kept, what
-        is, as text; else empty.
+        """Show the frame of a simulated time, s, of the run that is shown. Return a text on what is
+        kept if that time is not, else an empty one.
         """
         with self._lock:
             playhead = self._start_playhead() if self._recorded is None else None
@@ -130,7 +131,7 @@ class Timeline:
             self._playhead = None
 
     def hold(self, client: int) -> None:
-        """Stop at the shown instant while a page types another one."""
+        """Stop at the shown instant while the user of a page types a time."""
         with self._lock:
             self._holder = client
             if self._recorded is None:
@@ -141,7 +142,7 @@ class Timeline:
                 self._held = playhead if was_live else None
 
     def release(self, client: int) -> None:
-        """Become live again if the page that held typed nothing."""
+        """Return to the live frames if `hold` of this page left them and nothing was done since."""
         with self._lock:
             if client == self._holder and self._held is self._playhead:
                 self._playhead = None
@@ -181,7 +182,7 @@ class Timeline:
 
 def _missing(simulated: float, first: float, last: float, is_cut: bool) -> str:
     """Why a time, s, is not shown, of a run that is kept from ``first`` to ``last`` s; empty if it
-    is. ``is_cut``: what was before has made room.
+    is shown. ``is_cut``: whether older frames were dropped.
     """
     kept = f'This run is kept from {first:.2f} to {last:.2f} s'
     if simulated < first and is_cut:

@@ -118,7 +118,10 @@ class Transport:
             run_script(client, f'window.ragdollNotice?.({json.dumps(IN_THE_PAST)});')
 
     def update(self, live: Frame, shown: Frame, status: SourceStatus, now: float) -> None:
-        """Show the newest and the shown frame's time, at ``now`` s of a steady clock."""
+        """Show the state and time of the ``shown`` frame, and the events of the timeline.
+
+        ``live`` is the newest frame, ``now`` s of a steady clock.
+        """
         timeline, before = self._timeline, self.shown
         playing = not status.paused if timeline.is_live else timeline.is_playing
         changes = {'live': timeline.is_live, 'recorded': self._source.recording is not None,
@@ -156,13 +159,16 @@ class Transport:
                 run_script(client, SHOW % json.dumps(changes))
 
     def _note(self, page: int, text: str) -> None:
-        """Show a text at a page's field of the time; none if it is empty."""
+        """Show a text at a page's time field; an empty text removes it."""
         client = self._server.get_clients().get(page)
         if client is not None:
             run_script(client, f'window.ragdollTimeNote?.({json.dumps(text)});')
 
     def _take(self, page: int, text: str) -> None:
-        """An event of transport.js; of viser's thread. Done in order in another, as steps wait."""
+        """Take an event of transport.js in viser's thread.
+
+        Act on events in another thread, in order, because steps wait.
+        """
         asyncio.get_running_loop().run_in_executor(self._worker, self._act, page, text)
 
     def _act(self, page: int, text: str) -> None:

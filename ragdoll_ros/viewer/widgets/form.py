@@ -113,7 +113,8 @@ class Form:
         """Show these fields only, without errors; typed text that has the same value stays.
 
         ``keep_typed``: text that was typed since the values were read stays as well, unless
-        something else has changed the value of its field. ``changed``: `values` gives them all.
+        something else has changed the value of its field. ``changed``: mark all of them as changed,
+        so that `values` returns them.
         """
         self.show_errors(())
         self._color_errors.clear()
@@ -200,7 +201,8 @@ class Form:
     def _is_typed(self, key: str, widget: Any, value: FieldValue) -> bool:
         """Whether the field has text that was typed since it was read, and ``value`` is not new.
 
-        That text may be the one of before: who types 7 and, while that is applied, 5 again wants 5.
+        That text may equal the filled one: a user who types 7 and, while it is applied, the old 5
+        again, wants 5.
         """
         known = [pair for pair in (self._filled.get(key), self._submitted.get(key)) if pair]
         return (self._fields[key].widget in TYPED

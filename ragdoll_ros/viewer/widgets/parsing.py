@@ -1,8 +1,8 @@
 """Parses numbers and colours as people type them, or refuses them with a reason.
 
 Numbers are not rounded. Accepted: 70, 70.5, .5, 1e-3, 3,5 (a comma in a single number), 1 000 and
-1'000, 1,234.5 and 1.234,5, digits of any script, any minus sign, and a unit. Refused: ambiguous
-numbers (1,000), other text, and what a double cannot represent.
+1'000, 1,234.5 and 1.234,5, digits of any script, the minus sign of ASCII or Unicode (U+2212), and a
+unit. Refused: ambiguous numbers (1,000), other text, and what a double cannot represent.
 """
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def parse_number(text: str, unit: str = '', infinite: bool = False) -> float:
 def parse_numbers(text: str, count: int, unit: str = '') -> tuple[float, ...]:
     """``count`` numbers, separated by commas, spaces, or semicolons: 1,5; 2; 0,5.
 
-    The unit follows each or all of them; raises the errors of ``parse_number``.
+    A unit follows each of them or, without semicolons, all; raises the errors of ``parse_number``.
     """
     found, by_semicolon = split_numbers(text, count, unit), ';' in _normalized(text)
     try:
@@ -78,7 +78,10 @@ def parse_numbers(text: str, count: int, unit: str = '') -> tuple[float, ...]:
 
 
 def split_numbers(text: str, count: int, unit: str = '') -> list[tuple[str, int]]:
-    """Texts of ``count`` numbers, each with the power of ten of the unit that follows all."""
+    """Texts of ``count`` numbers, each with the power of ten of the unit that they share.
+
+    Between semicolons each text keeps its own unit, and the power is 0.
+    """
     plain = _normalized(text)
     if plain[:1] + plain[-1:] in ('()', '[]'):
         plain = plain[1:-1].strip()
@@ -119,7 +122,10 @@ def parse_color(event: str) -> tuple[int, int, int]:
 
 
 def two_digits(number: float) -> str:
-    """A positive number with two significant digits, without an exponent above 1e-4."""
+    """A positive number with two significant digits, from 99.5 on as a whole number.
+
+    Without an exponent above 1e-4.
+    """
     return f'{number:.0f}' if number >= 99.5 else f'{number:.2g}'
 
 
@@ -147,7 +153,7 @@ def _normalized(text: str) -> str:
 
 
 def _split_unit(plain: str, unit: str) -> tuple[str, int]:
-    """Text before a unit, and the unit's power of ten; other words are kept."""
+    """Text before a unit, and the unit's power of ten; the whole text and 0 without a unit."""
     match = _UNIT.search(plain)
     powers = UNITS.get(unit, {unit: 0})
     if match and match[0] in powers and plain[:match.start()].strip():

@@ -20,8 +20,9 @@ INTEGRATORS = ('euler', 'implicitfast', 'rk4')
 """Semi-implicit Euler with implicit joint damping; Euler implicit in all velocities; order 4."""
 
 CONTACT_SUBSTEPS, LIMIT_SUBSTEPS = 4.0, 2.0
-"""Time constants (solref) of contacts and of joint limits, in substeps. Shorter ones add energy,
-longer ones allow more penetration and overshoot."""
+"""Time constants (solref) of joint limits and of contacts without restitution, in substeps; with
+restitution contacts have the same frequency. Shorter ones add energy, longer ones allow more
+penetration and overshoot."""
 
 XYZW, WXYZ = [1, 2, 3, 0], [3, 0, 1, 2]
 """Permutations from MuJoCo's quaternion order w, x, y, z to x, y, z, w, and back."""
@@ -74,9 +75,11 @@ class MujocoEngine(SubsteppedEngine):
                       loads: Wrenches) -> set[tuple[int, int]]:
         """Take equal substeps by one call to MuJoCo; no pairs, which only _conserve() needs."""
         step = duration / substeps
-        if step != self._model.opt.timestep:
-            self._model.opt.timestep = step
-            self._model.geom_solref[:, 0] = CONTACT_SUBSTEPS * step
+        if step != self._substep:
+            self._model.opt.timestep = self._substep = step
+            # The frequency of a contact is 1 / (time constant * damping ratio): with the ratio of a
+            # high restitution, a time constant of some substeps would make it a period below one.
+            self._model.geom_solref[:, 0] = CONTACT_SUBSTEPS * step / self._model.geom_solref[:, 1]
             self._model.jnt_solref[:, 0] = LIMIT_SUBSTEPS * step
         self._apply(loads)
         self._mujoco.mj_step(self._model, self._data, substeps)
@@ -173,7 +176,7 @@ class MujocoEngine(SubsteppedEngine):
             self._roots.append(self._address(placement, doll.root.name + '/free'))
             self._balls += [self._ball(placement, joint) for joint in doll.joints
                             if joint.is_free_ball]
-        self._stale = True
+        self._stale, self._substep = True, 0.0
 
     def _ball(self, placement: Placement, joint: Joint) -> tuple[int, int, np.ndarray]:
         """Addresses in q and v of a free ball joint, and its child's orientation at rest in the

@@ -40,10 +40,11 @@ TOLERANCE = 1e-6
 class BodyHandles:
     """Handles of one body and of one mode at a time, with callbacks at the end of a drag.
 
-    They are replaced only where they change: a drag of one that is replaced is lost.
+    Handles are replaced only if what they show has changed: replacing one ends its drag.
 
-    ``on_pose`` takes the new centre of mass (3,) m and orientation (4,), doll's frame;
-    ``on_size`` the new half extents (3,) m in the body's frame. ``ranges`` are shown with them.
+    ``on_pose`` takes the new centre of mass (3,) m and orientation (4,), doll's frame; ``on_size``
+    the new half extents (3,) m in the body's frame. ``ranges``: handles of the joint's ranges,
+    shown together with these.
     """
 
     def __init__(self, server: viser.ViserServer, ranges: JointHandles,
@@ -112,7 +113,7 @@ class BodyHandles:
                 self._add_outline(f'{node}/frame', bone)
 
     def _begin(self, shown: object, reset: Callable[[], None]) -> None:
-        """Begin a new root, for handles that depend on ``shown``."""
+        """Remove all handles, and name a new root; ``reset`` draws what depends on ``shown``."""
         self.hide()
         self._shown, self._reset = shown, reset
         self._count += 1

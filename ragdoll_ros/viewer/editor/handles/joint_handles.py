@@ -42,7 +42,7 @@ class JointHandles:
         """What is dragged."""
 
     def show(self, root: str, frame: Pose, doll: Ragdoll, joint: Joint) -> None:
-        """Draw the ranges below node ``root``, the doll's frame, which has this pose."""
+        """Draw the ranges below node ``root``, at the doll's frame, whose pose is ``frame``."""
         self._frame, self._doll, self._joint, self._dragged = frame, doll, joint, joint
         child = doll.bone(joint.child)
         self._radius = REACH * (math.dist(child.position, joint.anchor)
@@ -65,7 +65,7 @@ class JointHandles:
                 for side in (0, 1)]
 
     def _needle(self, order: int) -> np.ndarray:
-        """Vector (3,) m from the anchor to the rim of an angle's sector, where that is zero."""
+        """Vector (3,) m from the anchor to the rim of an angle's sector where the angle is 0."""
         return self._radius * rotation.normalized(child_needle(self._doll, self._joint, order))
 
     def _tip(self, joint: Joint, edge: Edge) -> np.ndarray:
@@ -74,7 +74,9 @@ class JointHandles:
         return joint.anchor + range_arc(angle_axes(joint)[order], self._needle(order), pair)[-side]
 
     def _fans(self, joint: Joint) -> dict[int, np.ndarray]:
-        """Vertices (v, 3) m, the anchor first, of each sector by its angle; a cone's by 0."""
+        """Vertices (v, 3) m of each sector, the anchor first, by its angle's number; a cone has the
+        number 0.
+        """
         rims = {order: range_arc(angle_axes(joint)[order], self._needle(order), pair)
                 for order, pair in enumerate(joint.angle_limits) if pair}
         if joint.kind == 'ball' and 0 in rims and 1 in rims:
@@ -126,7 +128,7 @@ def fan(count: int) -> np.ndarray:
 
 def plane_point(eye: np.ndarray, pointer: np.ndarray, anchor: np.ndarray,
                 normal: np.ndarray) -> np.ndarray:
-    """Where a line of sight meets a plane; beside the plane, the point below ``pointer``."""
+    """Where a line of sight meets a plane; if nearly parallel, ``pointer`` projected onto it."""
     direction = pointer - eye
     steepness = float(direction @ normal)
     if abs(steepness) < 0.1 * float(np.linalg.norm(direction)):

@@ -1,4 +1,6 @@
-"""Rounds what is dragged to whole steps from where the drag has begun."""
+"""Rounds what is dragged to whole steps: poses from where the drag began, sizes and joint angles
+from zero.
+"""
 from __future__ import annotations
 
 import math
@@ -20,7 +22,7 @@ def snapped_position(new: Sequence[float], old: Sequence[float],
 
 
 def snapped_orientation(new: Sequence[float], old: Sequence[float]) -> np.ndarray:
-    """Orientation (4,) turned by whole steps from ``old``, about the axis of ``new``."""
+    """Turn orientation ``old`` (4,) by whole steps about the axis of the rotation to ``new``."""
     turn = rotation.rotation_vector(rotation.multiply(new, rotation.inverse(old)))
     angle = float(np.linalg.norm(turn))
     if angle < ANGLE / 2:

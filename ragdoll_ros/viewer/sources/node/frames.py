@@ -143,7 +143,7 @@ class NodeFrames:
                 self._topics[kind] = _NewMessages(self._node, TOPICS[kind], self._name)
 
     def set_scene(self, pushes: ObservedPushes, checksum: str) -> None:
-        """Use the scene of these pushes for its poses; ``checksum``: of its text on ~/scene."""
+        """Use the scene of ``pushes`` for poses; ``checksum``: of the scene's text on ~/scene."""
         with self._lock:
             self._checksum = checksum
             if self._pushes is pushes:
@@ -207,7 +207,7 @@ class NodeFrames:
             self._latest[kind], self._is_outdated = value, True
 
     def _complete_poses(self) -> Iterator[tuple[int, TickMeasures, np.ndarray]]:
-        """Stamp, measures and poses of the scene; those before are of another, or incomplete."""
+        """Stamp, measures and poses of each complete tick of the scene; drop others before."""
         known = {stamp: measures for stamp, measures in self._values.get('measures', {}).items()
                  if measures.scene == self._checksum}
         last = max((k for k, (stamp, _) in enumerate(self._poses) if stamp in known), default=-1)
@@ -217,7 +217,7 @@ class NodeFrames:
                 yield stamp, known[stamp], poses
 
     def _use(self, stamp: int) -> None:
-        """Make the messages with this stamp, where there are such, the latest ones."""
+        """Of each topic that has a message with this stamp, make that message the latest one."""
         for kind, values in self._values.items():
             if kind != 'measures' and stamp in values:
                 for old in list(values):
@@ -226,7 +226,7 @@ class NodeFrames:
                         break
 
     def _is_new(self, measures: TickMeasures) -> bool:
-        """Whether no frame of this run has been as late; notes it."""
+        """Whether measures are later than all before of their run; remember their time."""
         before = self._run_times.pop(measures.run, -1)
         self._run_times[measures.run] = max(before, measures.time)
         if len(self._run_times) > MAX_MESSAGES:
@@ -286,8 +286,9 @@ class _NewMessages:
             yield message
 
     def _warn_of_lost(self, number: int | None) -> None:
-        """Warn if messages between the last one and that of this number did not come; None: the
-        middleware does not count them.
+        """Warn if messages between the last one and the one of this ``number`` were lost.
+
+        None: the middleware does not count messages.
         """
         if None not in (self._number, number) and number > self._number + 1:
             self._logger.warning(

@@ -28,7 +28,10 @@ class _Hand:
 
 
 class NodeHands:
-    """Sends grabs as feedback of the bones' markers, displaced as the pointer is."""
+    """Sends grabs as feedback of the bones' interactive markers.
+
+    A marker is displaced as its target is from the grabbed point.
+    """
 
     def __init__(self, node: Node, name: str) -> None:
         self._node = node

@@ -10,7 +10,7 @@ from std_msgs.msg import Float64
 class StrengthPublisher:
     """Publishes ``~/motor_strength`` of the node ``name``.
 
-    What is published before the subscription is matched is lost: the newest strength waits for it.
+    The newest strength waits until a subscription is matched: a message sent before is lost.
     """
 
     def __init__(self, node: Node, name: str) -> None:

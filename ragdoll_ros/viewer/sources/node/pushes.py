@@ -67,6 +67,9 @@ class ObservedPushes:
 
     @property
     def pushes(self) -> tuple[Push, ...]:
-        """Pushes that act now; a time before a push's start, after a reset, ends it."""
+        """Pushes that act at the time of the newest poses.
+
+        After a reset, a push does not act at times before its start.
+        """
         return tuple(push for start, push in list(self._pushes.values())
                      if start <= self.time < start + push.duration)

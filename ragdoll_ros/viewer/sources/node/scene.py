@@ -26,7 +26,7 @@ def scene_of_node(name: str, text: str, names: Sequence[str],
 
     ``name`` is the node's parameter `scene`, ``text`` what it publishes on ~/scene, ``names`` its
     `bone_names`, ``description`` its URDF, which is used if the text names files that are not on
-    this machine. Raises RagdollError if that has not these bones.
+    this machine. Raises RagdollError if the URDF lacks such a bone.
     """
     try:
         return read_run_scene(text)[0], ''
@@ -95,7 +95,7 @@ class NodeScene:
         self._use()
 
     def _use(self) -> None:
-        """Use the scene of the text, and the parameters, as far as they are known."""
+        """Use scene and parameters once both are known; set ``problem`` if they do not match."""
         if self._text is None or self._names is None:
             return
         if not self._text:

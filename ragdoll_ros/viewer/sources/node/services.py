@@ -39,12 +39,12 @@ class NodeServices:
         """When triggers were asked for whose services are not known yet, s of the steady clock."""
 
     def trigger(self, service: str) -> None:
-        """Call ``reset``, ``step`` or ``go_limp``; one that is not known yet as soon as it is."""
+        """Call ``reset``, ``step`` or ``go_limp``; if its service is unknown, `retry` does it."""
         if not self._send(self._triggers[service], Trigger.Request()):
             self._waiting[service] = time.monotonic()
 
     def retry(self) -> None:
-        """Call what waits; nothing that has waited for longer than PATIENCE."""
+        """Call waiting services that are known now; drop what has waited for over PATIENCE."""
         for service, asked in list(self._waiting.items()):
             if time.monotonic() - asked > PATIENCE or self._send(
                     self._triggers[service], Trigger.Request()):

@@ -59,7 +59,7 @@ KEYS = ('work_of_pushes_J', 'work_of_grabs_J', 'energy_excess_J')
 
 
 class NodeSource(Source):
-    """Subscribes to the node in its own namespace, in a thread of its own, while a page is open."""
+    """Subscribes to the node in the viewer's namespace, in a thread, while a page is open."""
 
     def __init__(self, arguments: list[str]) -> None:
         self._context = rclpy.Context()

@@ -17,8 +17,8 @@ class StatePublisher:
         self._publisher = node.create_publisher(Odometry, f'{name}/set_state', 10)
 
     def send(self, frame: str, doll: str, position: Vector, velocity: Vector) -> None:
-        """Set the pose of a doll's root, with the axes of the world frame ``frame``, and its
-        velocity; ``position`` (3,) m, ``velocity`` (3,) m/s, both along these axes.
+        """Set the pose and velocity of a doll's root: ``position`` (3,) m and ``velocity`` (3,) m/s
+        in the world frame ``frame``, and the axes of this frame.
         """
         x, y, z = position
         self._publisher.publish(Odometry(
