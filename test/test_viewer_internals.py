@@ -6,6 +6,7 @@ import asyncio
 import collections
 import json
 import re
+import threading
 from importlib.metadata import version
 from pathlib import Path
 
@@ -108,29 +109,44 @@ def test_a_script_is_html_whose_attribute_is_the_script():
     assert code == 'const KEY = "a \\"b\\" <c> & \'d\'";\n' + scripts.source('hint.js')
 
 
-class Changing(collections.deque):
-    """Waiters of which one comes or goes while they are gone through, the first two times."""
+def queue(event, loop):
+    """What viser does with its event as another thread queues a message."""
+    event.set()
+    loop.call_soon_threadsafe(event.set)
 
-    left = 2
 
-    def __iter__(self):
-        found = super().__iter__()
-        yield next(found)
-        if self.left:
-            self.left -= 1
-            raise RuntimeError('deque mutated during iteration')
-        yield from found
+class Late(collections.deque):
+    """Waiters that begin to wait just after another thread has queued a message."""
+
+    def __init__(self, *queued):
+        super().__init__()
+        self.queued = queued
+
+    def append(self, waiter):
+        thread = threading.Thread(target=queue, args=self.queued)
+        thread.start()
+        thread.join()
+        super().append(waiter)
 
 
 def test_a_message_from_another_thread_wakes_all_that_wait(server):
-    """Viser tells of messages by an event that it sets outside of its loop's thread."""
     async def woken():
-        event = viser_internals.ThreadSafeEvent()
+        event, loop = viser_internals.ThreadSafeEvent(), asyncio.get_running_loop()
         waiters = [asyncio.ensure_future(event.wait()) for _ in range(3)]
         await asyncio.sleep(0)
-        event._waiters = Changing(event._waiters)
-        await asyncio.get_running_loop().run_in_executor(None, event.set)
+        await loop.run_in_executor(None, queue, event, loop)
         return await asyncio.wait_for(asyncio.gather(*waiters), 60)
     assert asyncio.run(woken()) == [True] * 3
     event = server._websock_server.get_message_buffer().message_event
     assert isinstance(event, viser_internals.ThreadSafeEvent)
+
+
+def test_a_message_that_comes_as_one_begins_to_wait_wakes_it():
+    """Else the page stands still for ever: no later message wakes it either."""
+    async def woken(kind):
+        event, loop = kind(), asyncio.get_running_loop()
+        event._waiters = Late(event, loop)
+        return await asyncio.wait_for(event.wait(), 0.5)
+    assert asyncio.run(woken(viser_internals.ThreadSafeEvent))
+    with pytest.raises(asyncio.TimeoutError):
+        asyncio.run(woken(asyncio.Event))

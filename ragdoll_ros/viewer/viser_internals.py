@@ -33,19 +33,22 @@ _make_buffer = AsyncMessageBuffer.__init__
 class ThreadSafeEvent(asyncio.Event):
     """An event that any thread may set, as viser does with its event of a new message.
 
-    asyncio's Event raises RuntimeError if a waiter comes or goes meanwhile; that ended the viewer.
+    Viser sets it in the thread that queues a message, and then in that of the loop. With asyncio's
+    Event the first call may come between a waiter's look at the event and the place where it waits:
+    the second one then wakes nobody, as the event is set already, and the page never gets another
+    message. It raises RuntimeError if a waiter comes or goes meanwhile, which ended the viewer.
     """
 
     def set(self) -> None:
-        """Wake all waiters."""
-        while True:
-            try:
-                super().set()
-                return
-            except RuntimeError as error:
-                if 'mutated' not in str(error):
-                    raise
-                self._value = False  # or the next turn would wake nobody
+        """Set the event; in the loop's thread wake all waiters, whether it was set or not."""
+        self._value = True
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:  # another thread
+            return
+        for waiter in self._waiters:
+            if not waiter.done():
+                waiter.set_result(True)
 
 
 def _make_safe_buffer(buffer: AsyncMessageBuffer, *args: Any, **options: Any) -> None:
