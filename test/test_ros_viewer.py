@@ -27,6 +27,7 @@ from ragdoll_ros.files.run_scene import run_scene_text
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf import scene_to_urdf
 from ragdoll_ros.model.errors import RagdollError
+from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.ros.latched_topic import LATCHED_HISTORY
 from ragdoll_ros.ros.messages.convert import to_pose_array
@@ -310,6 +311,17 @@ def test_another_accuracy_and_what_its_ticks_cost(node, remote):
             remote.set_accuracy('perfect')
     finally:
         remote.set_accuracy('normal')
+
+
+def test_a_push_ends_at_a_reset_for_good():
+    """Also where the new run comes to the time of the old one."""
+    pushes = ObservedPushes(load_scene('drop'))
+    pushes.set_time(5.0)
+    pushes.push(Push('torso', (1.0, 0.0, 0.0), duration=1.0), 'keys')
+    assert len(pushes.pushes) == 1
+    for instant in (0.0, 5.5):
+        pushes.set_time(instant)
+        assert not pushes.pushes
 
 
 def test_pushes_of_others_are_shown(node, remote, peer):

@@ -66,7 +66,7 @@ def parse_number(text: str, unit: str = '', infinite: bool = False) -> float:
 def parse_numbers(text: str, count: int, unit: str = '') -> tuple[float, ...]:
     """``count`` numbers, separated by commas, spaces, or semicolons: 1,5; 2; 0,5.
 
-    A unit follows each of them or, without semicolons, all; raises the errors of ``parse_number``.
+    A unit that only the last one has is that of all; raises the errors of ``parse_number``.
     """
     found, by_semicolon = split_numbers(text, count, unit), ';' in _normalized(text)
     try:
@@ -87,6 +87,9 @@ def split_numbers(text: str, count: int, unit: str = '') -> list[tuple[str, int]
         plain = plain[1:-1].strip()
     if ';' in plain:
         found, power = [part.strip() for part in plain.split(';')], 0
+        *before, own = (part[len(_split_unit(part, unit)[0]):] for part in found)
+        if own and not any(before):
+            found = [part + own for part in found[:-1]] + found[-1:]
     else:
         if unit in _UNIT_SPACES:
             plain = _UNIT_SPACES[unit].sub('', plain)

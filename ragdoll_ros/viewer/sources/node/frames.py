@@ -238,7 +238,7 @@ class NodeFrames:
         self._last, self._is_outdated, self._moves = (measures, poses), False, self._hands.moves
         unknown = np.full((len(poses), 3), np.nan)
         state = State(poses[:, :3], poses[:, 3:], unknown, unknown)
-        self._pushes.time = measures.time / SECOND
+        self._pushes.set_time(measures.time / SECOND)
         masses, rods = self._latest.get('swings'), None
         if masses is not None and len(masses) == self._rods.count:
             rods = self._rods.ends(masses, state)

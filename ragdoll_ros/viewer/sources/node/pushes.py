@@ -54,8 +54,14 @@ class ObservedPushes:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.time = 0.0
-        """Simulated time of the newest poses, s."""
+        """Simulated time of the newest poses, s; see set_time()."""
         self._pushes: dict[str, tuple[float, Push]] = {}
+
+    def set_time(self, time: float) -> None:
+        """Set the time; pushes end as it goes back, at a reset."""
+        if time < self.time:
+            self._pushes.clear()
+        self.time = time
 
     def push(self, push: Push | Drive, channel: str) -> None:
         """Start a push in place of the last one of its channel."""
@@ -67,9 +73,6 @@ class ObservedPushes:
 
     @property
     def pushes(self) -> tuple[Push, ...]:
-        """Pushes that act at the time of the newest poses.
-
-        After a reset, a push does not act at times before its start.
-        """
+        """Pushes that act at the time of the newest poses."""
         return tuple(push for start, push in list(self._pushes.values())
                      if start <= self.time < start + push.duration)
