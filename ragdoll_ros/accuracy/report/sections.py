@@ -204,13 +204,15 @@ Machine: {about['machine']}, {about['cores']} cores, {about['system']}. Python {
 {versions}.
 {f"Our accuracies are those of the engine {about['engine']}." if 'engine' in about else ''}\
 {f" Not compared, as not installed: {missing}." if missing else ''}\
-{''.join(dict.fromkeys(map(newer, about.get('updated', {}).values())))}""",
+{''.join(dict.fromkeys(newer(part, about['machine'])
+                        for part in about.get('updated', {}).values()))}""",
             f"""\
 {PLAIN if 'missing' in about else WHOLE} On reference motions each tick counts with the median of \
 its runs; in comparisons with PyBullet and of scenes with the least, which excludes the load of \
 other processes. Compare ratios, not times. N is the number of substeps in a tick of 10 ms."""]
 
 
-def newer(about: dict) -> str:
-    """Sentence on parts that a later run measured again."""
-    return f" Measured again by `{about['command']}` on {about['date']}."
+def newer(part: dict, machine: str) -> str:
+    """Sentence on a part that a later run measured again, maybe not on the same ``machine``."""
+    where = '' if part['machine'] == machine else f', on another machine: {part["machine"]}'
+    return f" Measured again by `{part['command']}` on {part['date']}{where}."
