@@ -20,7 +20,7 @@ from .widgets.form import GREY, RED, Field, Form, colored
 
 ERRORS_MM = {'rigid': {'draft': 0.46, 'normal': 0.27, 'exact': 0.03},
              'bullet': {'draft': 7, 'normal': 5, 'exact': 4},
-             'mujoco': {'draft': 11, 'normal': 8, 'exact': 7}}
+             'mujoco': {'draft': 16, 'normal': 10, 'exact': 6}}
 """Position error of the default doll's bones after 0.1 s of contacts, median of 240 segments, for
 each engine: docs/accuracy.md, 'pieces'. `exact` of PyBullet and MuJoCo is that of 32 substeps."""
 
