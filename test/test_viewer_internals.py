@@ -115,6 +115,14 @@ def queue(event, loop):
     loop.call_soon_threadsafe(event.set)
 
 
+class Waiters(collections.deque):
+    """Waiters of a loop, which only its own thread may go through: they come and go in it."""
+
+    def __iter__(self):
+        assert threading.current_thread() is threading.main_thread()
+        return super().__iter__()
+
+
 class Late(collections.deque):
     """Waiters that begin to wait just after another thread has queued a message."""
 
@@ -134,6 +142,7 @@ def test_a_message_from_another_thread_wakes_all_that_wait(server):
         event, loop = viser_internals.ThreadSafeEvent(), asyncio.get_running_loop()
         waiters = [asyncio.ensure_future(event.wait()) for _ in range(3)]
         await asyncio.sleep(0)
+        event._waiters = Waiters(event._waiters)
         await loop.run_in_executor(None, queue, event, loop)
         return await asyncio.wait_for(asyncio.gather(*waiters), 60)
     assert asyncio.run(woken()) == [True] * 3

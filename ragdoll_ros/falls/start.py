@@ -129,12 +129,15 @@ def _with_friction(doll: Ragdoll, ground: dict) -> Ragdoll:
     A contact has the geometric mean of both sides' friction; if one is infinite, that of the other.
     On a ground without friction they are 0.
     """
-    under, full = ground.get('friction_under', {}), ground['friction']
-    factor = {name: value if math.isinf(full) else value ** 2 / full if full else 0.0
-              for name, value in under.items()}
+    under = ground.get('friction_under', {})
+    if not under:
+        return doll
+    full = ground['friction']
+    own = {name: value if math.isinf(full) else value ** 2 / full if full else 0.0
+           for name, value in under.items()}
     return replace(doll, bones=tuple(
-        replace(bone, friction=factor[bone.name]) if bone.name in factor else bone
-        for bone in doll.bones)) if under else doll
+        replace(bone, friction=own[bone.name]) if bone.name in own else bone
+        for bone in doll.bones))
 
 
 def _ground(drawn: dict, stiffness: float) -> Ground:

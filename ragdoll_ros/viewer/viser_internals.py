@@ -33,10 +33,11 @@ _make_buffer = AsyncMessageBuffer.__init__
 class ThreadSafeEvent(asyncio.Event):
     """An event that any thread may set, as viser does with its event of a new message.
 
-    Viser sets it in the thread that queues a message, and then in that of the loop. With asyncio's
-    Event the first call may come between a waiter's look at the event and the place where it waits:
-    the second one then wakes nobody, as the event is set already, and the page never gets another
-    message. It raises RuntimeError if a waiter comes or goes meanwhile, which ended the viewer.
+    Viser sets it in the thread that queues a message, and then in the thread of the event loop.
+    asyncio.Event is not thread-safe: if the first call comes after a waiter has checked the event
+    and before it is in the list of waiters, the second call wakes nobody, as the event is already
+    set, and the page never gets another message. If the list changes during the first call, that
+    raises RuntimeError, which ended the viewer.
     """
 
     def set(self) -> None:

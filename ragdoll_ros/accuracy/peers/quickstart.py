@@ -113,8 +113,8 @@ class Quickstart:
     def _place(self) -> None:
         """Set the trial's initial state; joint coordinates are in the order of a body's joints."""
         dolls = self._trial.scene.dolls
-        start, layout = self._trial.start or placed_coordinates(dolls), DofLayout(
-            [placement.doll for placement in dolls])
+        start = self._trial.start or placed_coordinates(dolls)
+        layout = DofLayout([placement.doll for placement in dolls])
         for body, at_q, at_v in zip(self._bodies, layout.doll_q, layout.doll_v, strict=True):
             q, v = start.q[at_q].tolist(), start.v[at_v].tolist()
             pybullet.resetBasePositionAndOrientation(body, q[:3], q[3:7], self._client)

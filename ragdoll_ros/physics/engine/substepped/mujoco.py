@@ -77,8 +77,8 @@ class MujocoEngine(SubsteppedEngine):
         step = duration / substeps
         if step != self._substep:
             self._model.opt.timestep = self._substep = step
-            # The frequency of a contact is 1 / (time constant * damping ratio): with the ratio of a
-            # high restitution, a time constant of some substeps would make it a period below one.
+            # A contact's frequency is 1 / (time constant * damping ratio). A high restitution has a
+            # small ratio: undivided by it, the time constant would give a period below a substep.
             self._model.geom_solref[:, 0] = CONTACT_SUBSTEPS * step / self._model.geom_solref[:, 1]
             self._model.jnt_solref[:, 0] = LIMIT_SUBSTEPS * step
         self._apply(loads)
