@@ -7,6 +7,7 @@ import collections
 import json
 import re
 import threading
+from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 
@@ -107,6 +108,49 @@ def test_a_script_is_html_whose_attribute_is_the_script():
                               ('&amp;', '&')):
         code = code.replace(entity, character)
     assert code == 'const KEY = "a \\"b\\" <c> & \'d\'";\n' + scripts.source('hint.js')
+
+
+@pytest.fixture
+def page(server):
+    """A page that has had all messages until now, whose sender waits for the next."""
+    page = PageClient(server.get_port())
+    event = server._websock_server.get_message_buffer().message_event
+    try:
+        wait(lambda: has_all(server) and event._waiters and not event.is_set())
+        yield page
+    finally:
+        page.close()
+
+
+def has_all(server):
+    """Whether every open page has had every message."""
+    buffer = server._websock_server.get_message_buffer()
+    cursors = buffer.generator_cursors
+    return bool(cursors) and set(cursors.values()) == {buffer.message_counter - 1}
+
+
+def test_what_another_thread_queues_beside_a_block_is_sent(server, page):
+    """Where its own block ends within one in which nothing is queued."""
+    with ExitStack() as other:
+        other.enter_context(server.atomic())
+        server.scene.add_frame('/beside')
+        with viser_internals.sent_at_once(server):
+            other.close()
+    wait(lambda: has_all(server))
+
+
+def test_what_is_queued_is_sent_though_the_sender_looks_in_the_next_block(server, page):
+    """In which it must not send, and in which nothing is queued."""
+    buffer = server._websock_server.get_message_buffer()
+    event, go_on = buffer.message_event, threading.Event()
+    buffer.event_loop.call_soon_threadsafe(go_on.wait)
+    with viser_internals.sent_at_once(server):
+        server.scene.add_frame('/before')
+    with viser_internals.sent_at_once(server):
+        go_on.set()
+        wait(lambda: event._waiters and not event.is_set())
+        assert not has_all(server)
+    wait(lambda: has_all(server))
 
 
 def queue(event, loop):

@@ -93,17 +93,25 @@ def sent_at_once(server: viser.ViserServer) -> Iterator[None]:
     system call and a change of threads. Without flush it collects messages for up to 1/60 s.
     """
     buffer = server._websock_server.get_message_buffer()
-    before = buffer.message_counter
     buffer.atomic_start()
     try:
         yield
     finally:
         with buffer.buffer_lock:
             buffer.atomic_counter -= 1
-            has_changed = buffer.atomic_counter == 0 and buffer.message_counter != before
-        if has_changed:
+            may_send = buffer.atomic_counter == 0
+        if may_send and _has_unsent(buffer):
             with suppress(RuntimeError):  # the server has stopped
                 buffer.event_loop.call_soon_threadsafe(_wake, buffer)
+
+
+def _has_unsent(buffer: AsyncMessageBuffer) -> bool:
+    """Whether a page lacks a message, also one that was queued before this block or beside it.
+
+    A sender that is woken within a block sends nothing and waits again.
+    """
+    newest = buffer.message_counter - 1
+    return any(sent < newest for sent in tuple(buffer.generator_cursors.values()))
 
 
 def _wake(buffer: Any) -> None:
