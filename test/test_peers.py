@@ -40,6 +40,7 @@ from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
+from ragdoll_ros.model.static_body import StaticBody
 from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 from ragdoll_ros.physics.engine.substepped.engine import FrictionWarning
 from ragdoll_ros.physics.engine.substepped.mujoco import (
@@ -191,6 +192,15 @@ def test_friction_that_an_engine_has_not_is_warned_of(make, friction, text):
     told = [str(entry.message) for entry in found if entry.category is FrictionWarning]
     assert len(told) == bool(text)
     assert all(text in entry for entry in told)
+
+
+def test_friction_of_a_static_body_is_warned_of_too():
+    scene = load_scene('drop')
+    wall = StaticBody('wall', Box((.1, 1.0, 1.0)), position=(3.0, 0.0, .5), friction=20.0)
+    scene = dataclasses.replace(scene, bodies=(wall,), material=dataclasses.replace(
+        scene.material, friction=.7))
+    with pytest.warns(FrictionWarning, match='friction 20 is a coefficient of 10'):
+        BulletEngine(scene, PLAIN).close()
 
 
 def compared_trials():

@@ -12,7 +12,9 @@ from peer import PATIENCE, Peer, end, kill, start, start_on_terminal
 from screen import Screen
 from sensor_msgs.msg import MultiDOFJointState
 
+from ragdoll_ros import Bone, Joint, Placement, Ragdoll, Scene, Sphere, save_scene
 from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.ros.teleop.doll_motion import DollMotion
 from ragdoll_ros.ros.teleop.teleop import NodeFinder
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
@@ -150,6 +152,26 @@ def test_a_held_key_goes_to_the_top_speed_and_not_beyond(peer):
     peer.wait(lambda: centre_speed(held_for(screen, peer, b'\x1b[B', states, 0.5)) > 10)
     assert end(process, signal.SIGINT)[0] == 0
     kill(node)
+
+
+def test_the_speed_that_is_limited_is_the_roots_wherever_its_bone_stands(make_node, peer, tmp_path):
+    """The root of this doll, the last of its bones, swings backwards, the other one forwards,
+    so slowly that a busy machine finds them much as they were.
+    """
+    bones = tuple(Bone(name, Sphere(0.1), 1.0, (0.0, 0.0, height))
+                  for name, height in (('arm', 1.5), ('body', 0.5)))
+    doll = Ragdoll('pair', bones, (Joint('body', 'arm', 'hinge', (0.0, 0.0, 1.0),
+                                         ((0.0, 1.0, 0.0),)),))
+    pair = Scene('pair', (Placement(doll, rates={'arm': 0.02}),), gravity=(0.0, 0.0, 0.0))
+    save_scene(pair, tmp_path / 'pair.yaml')
+    node = make_node(scene=str(tmp_path / 'pair.yaml'))
+    peer.executor_.add_node(node)
+    states = peer.collect(MultiDOFJointState, '/ragdoll/state')
+    motion = DollMotion(peer, '/ragdoll', lambda: states[-1][1] if states else None)
+    peer.wait(lambda: motion.mass)
+    assert motion.mass == pytest.approx(2.0)
+    assert motion.speed(np.array((1.0, 0.0, 0.0))) == pytest.approx(0.0, abs=1e-9)
+    assert motion.speed(np.array((-1.0, 0.0, 0.0))) == pytest.approx(0.005, rel=0.1)
 
 
 def test_a_top_speed_out_of_range_is_refused(peer):

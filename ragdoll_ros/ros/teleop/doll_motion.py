@@ -23,6 +23,7 @@ class DollMotion:
                  state: Callable[[], MultiDOFJointState | None]) -> None:
         self._state = state
         self._masses: dict[str, float] = {}
+        self._roots: set[str] = set()
         self.scene = ''
         """Name of the scene; empty if it is not known."""
         namespace = name.rsplit('/', 1)[0]
@@ -32,26 +33,30 @@ class DollMotion:
     @property
     def mass(self) -> float:
         """Mass of the doll, kg; 0 if it is not known."""
-        return float(self._rows()[0].sum())
+        return float(self._rows()[1].sum())
 
     def speed(self, direction: np.ndarray) -> float:
-        """Speed, m/s, along a unit vector (3,): that of the first bone or of the doll's centre of
-        mass, whichever is larger. The doll must have a mass.
+        """Speed, m/s, along a unit vector (3,): that of the root or of the doll's centre of mass,
+        whichever is larger. The doll must have a mass.
         """
-        masses, velocities = self._rows()
+        names, masses, velocities = self._rows()
         speeds = velocities @ direction
-        return float(max(speeds[0], masses @ speeds / masses.sum()))
+        root = next((k for k, name in enumerate(names) if name in self._roots), 0)
+        return float(max(speeds[root], masses @ speeds / masses.sum()))
 
-    def _rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Masses (n,) kg and velocities (n, 3) m/s of the doll's bones, in the order of ~/state."""
+    def _rows(self) -> tuple[list[str], np.ndarray, np.ndarray]:
+        """Names, masses (n,) kg and velocities (n, 3) m/s of the doll's bones, in the order of
+        ~/state.
+        """
         state = self._state()
         if state is None or not state.joint_names:
-            return np.zeros(0), np.zeros((0, 3))
+            return [], np.zeros(0), np.zeros((0, 3))
         first = state.joint_names[0].rpartition('/')[0]
         own = [k for k, name in enumerate(state.joint_names)
                if name.rpartition('/')[0] == first and name in self._masses]
         twists = [state.twist[k].linear for k in own]
-        return (np.array([self._masses[state.joint_names[k]] for k in own]),
+        names = [state.joint_names[k] for k in own]
+        return (names, np.array([self._masses[name] for name in names]),
                 np.array([(twist.x, twist.y, twist.z) for twist in twists]).reshape(-1, 3))
 
     def _take(self, message: String) -> None:
@@ -60,3 +65,5 @@ class DollMotion:
             robot = parse_urdf(message.data)
             self.scene = robot.name
             self._masses = {name: link.mass for name, link in robot.links.items()}
+            self._roots = {name for name in robot.links if name not in robot.joints
+                           or robot.joints[name].kind == 'floating'}

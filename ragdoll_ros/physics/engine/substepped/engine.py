@@ -298,8 +298,8 @@ class SubsteppedEngine(ABC):
 
 
 def _warn_of_friction(scene: Scene) -> None:
-    """Warn where finite_friction() replaces a coefficient of the ground or of a bone."""
-    most = max(scene.material.on(bone)[0] for bone in (None, *scene.bones))
+    """Warn where finite_friction() replaces a coefficient of the ground, a bone or a static body."""
+    most = max(scene.material.on(surface)[0] for surface in (None, *scene.bones, *scene.bodies))
     if most > LARGEST_FRICTION:
         text = (f'unlimited friction is a coefficient of {NO_SLIP:g}' if math.isinf(most) else
                 f'friction {most:g} is a coefficient of {LARGEST_FRICTION:g}')
