@@ -29,7 +29,7 @@ from .sources.source import Frame, RequestedData, Source, SourceStatus
 from .start_when_visible import StartWhenVisible
 from .timeline.timeline import Timeline
 from .timeline.transport import Transport
-from .viser_internals import sent_at_once
+from .viser_internals import sent_at_once, wait_until_sent
 from .widgets.form import GREY, RED, colored
 
 PERIOD = 1 / 60
@@ -132,6 +132,7 @@ class Page:
             is_open = self.update()
             next_time = max(next_time + (PERIOD if is_open else IDLE_PERIOD), time.monotonic())
             stop.wait(next_time - time.monotonic())
+            wait_until_sent(self.server, PERIOD)
         self.source.request(RequestedData())
 
     def update(self) -> bool:

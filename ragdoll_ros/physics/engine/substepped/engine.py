@@ -298,7 +298,7 @@ class SubsteppedEngine(ABC):
 
 
 def _warn_of_friction(scene: Scene) -> None:
-    """Warn where finite_friction() replaces a coefficient of the ground, a bone or a static body."""
+    """Warn where finite_friction() replaces the friction of the ground, a bone or a static body."""
     most = max(scene.material.on(surface)[0] for surface in (None, *scene.bones, *scene.bodies))
     if most > LARGEST_FRICTION:
         text = (f'unlimited friction is a coefficient of {NO_SLIP:g}' if math.isinf(most) else
