@@ -113,6 +113,9 @@ def test_poses_come_with_exact_stamps(heard, peer):
     change(peer, 'real_time_factor', PACE / 4)
     peer.wait(lambda: np.mean(spacings(heard['poses'][-200:]) == 4 * SPACING) > 0.95)
     change(peer, 'real_time_factor', PACE)
+    # The next report is of both paces.
+    reports = len(heard['diagnostics'])
+    peer.wait(lambda: len(heard['diagnostics']) >= reports + 2)
     poses = np.array([poses_array(message) for _, message in got])
     assert poses.shape == (300, 10, 7)
     np.testing.assert_allclose(np.linalg.norm(poses[:, :, 3:], axis=2), 1, atol=1e-12)
