@@ -122,6 +122,13 @@ def wait(condition, timeout=PATIENCE):
         time.sleep(0.005)
 
 
+def has_all(server):
+    """Whether every open page has had every message."""
+    buffer = server._websock_server.get_message_buffer()
+    cursors = buffer.generator_cursors
+    return bool(cursors) and set(cursors.values()) == {buffer.message_counter - 1}
+
+
 @contextmanager
 def served(source, folder='.'):
     """A page of a source, drawn by a thread; its clients and the source are closed at the end."""

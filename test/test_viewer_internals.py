@@ -17,7 +17,7 @@ from packaging.specifiers import SpecifierSet
 pytest.importorskip('viser')
 import viser
 from conftest import ROOT
-from page_client import PageClient, wait
+from page_client import PageClient, has_all, wait
 from viser import _messages
 
 from ragdoll_ros.viewer import viser_internals
@@ -120,13 +120,6 @@ def page(server):
         yield page
     finally:
         page.close()
-
-
-def has_all(server):
-    """Whether every open page has had every message."""
-    buffer = server._websock_server.get_message_buffer()
-    cursors = buffer.generator_cursors
-    return bool(cursors) and set(cursors.values()) == {buffer.message_counter - 1}
 
 
 def test_what_another_thread_queues_beside_a_block_is_sent(server, page):

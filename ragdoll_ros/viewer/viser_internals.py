@@ -111,8 +111,8 @@ def sent_at_once(server: viser.ViserServer) -> Iterator[None]:
 def wait_until_sent(server: viser.ViserServer, timeout: float) -> None:
     """Wait until some page has been sent all messages, at most ``timeout`` s.
 
-    Within sent_at_once nothing is sent. Blocks that follow each other without a pause left viser's
-    thread no time to send: of blocks of 30 ms nine in ten were not sent by themselves.
+    Nothing is sent within sent_at_once. If the next block begins at once, as where a frame takes
+    long to draw, viser's thread has no time to send the last one.
     """
     buffer, end = server._websock_server.get_message_buffer(), time.monotonic() + timeout
     while time.monotonic() < end:
@@ -123,9 +123,9 @@ def wait_until_sent(server: viser.ViserServer, timeout: float) -> None:
 
 
 def _has_unsent(buffer: AsyncMessageBuffer) -> bool:
-    """Whether a page lacks a message, also one that was queued before this block or beside it.
+    """Whether a page lacks a message, also one queued before this block or by another thread.
 
-    A sender that is woken within a block sends nothing and waits again.
+    Viser's sender, if woken within a block, sends nothing and waits again.
     """
     newest = buffer.message_counter - 1
     return any(sent < newest for sent in tuple(buffer.generator_cursors.values()))
