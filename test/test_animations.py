@@ -215,6 +215,22 @@ def test_copies_run_where_each_is_turned(tmp_path, doll):
             scene.dolls[0].orientation), scene.dolls[0].velocity), abs=1e-9)
 
 
+@pytest.mark.parametrize('start', [f'time: {TIME}', f'start: {TIME}', f'speed: 2, start: {TIME}'])
+def test_copies_are_turned_about_the_centre_of_mass_that_the_animation_has(tmp_path, doll, start):
+    """Of `run`, which has gone 2 m by then: whichever way the copies face, they stand in a grid."""
+    copies = load_scene(scene_file(
+        tmp_path, doll, animation=f'{{name: run, {start}}}', position=[1, 2, 0.5],
+        orientation=[0.1, 0.2, 0.3, 0.9], velocity=[0.5, 0, 0],
+        repeat='{count: 4, grid: [2, 3, 0], turned: yaw, seed: 4}')).dolls
+    centers = []
+    for copy in copies:
+        weights = [bone.mass for bone in copy.doll.bones]
+        places = [copy.bone_pose(bone).position for bone in copy.doll.bones]
+        centers.append(np.average(places, axis=0, weights=weights))
+    assert np.array(centers) - centers[0] == pytest.approx(
+        np.array([(0, 0, 0), (2, 0, 0), (0, 3, 0), (2, 3, 0)]), abs=1e-9)
+
+
 @pytest.mark.parametrize(('entry', 'place', 'words'), [
     ({'animation': '{name: walk}'}, 'animation.name',
      'UnknownAnimation: .walk.; expected one of swing, baked swing, jump, baked jump, run'),

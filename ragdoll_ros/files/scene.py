@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..model.errors import (
     ModelError,
     ModelErrors,
@@ -20,6 +22,7 @@ from ..model.errors import (
 from ..model.motors import Motors
 from ..model.per_doll import PerDoll
 from ..model.playback import Playback
+from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
@@ -204,8 +207,16 @@ def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
 def _copies(doll: Ragdoll, entry: dict, folder: Path) -> list[Placement]:
     """The doll as an entry of the scene places, repeats and animates it."""
     first = _placement(doll, entry)
-    copies = repeated(first, entry['repeat']) if 'repeat' in entry else [first]
-    return _animated(copies, entry, folder) if 'animation' in entry else copies
+    if 'animation' not in entry:
+        return repeated(first, entry['repeat']) if 'repeat' in entry else [first]
+    animate = _animator(doll, entry, folder)
+    animated = animate(first)
+    if 'repeat' not in entry:
+        return [animated]
+    frame, start = (Pose(np.array(each.position), np.array(each.orientation))
+                    for each in (first, animated.start))
+    center = frame.apply_inverse(start.apply(animated.start.mass_centre))
+    return [animate(copy) for copy in repeated(first, entry['repeat'], center)]
 
 
 def _placement(doll: Ragdoll, entry: dict) -> Placement:
@@ -239,26 +250,32 @@ def _motors_data(motors: Motors) -> dict:
     return {key: value for key, value in values.items() if value != math.inf}
 
 
-def _animated(copies: list[Placement], entry: dict, folder: Path) -> list[Placement]:
-    """Return the copies of a doll with the animation of their entry; with a ``time``, limp in the
-    pose and with the velocities of the animation at that time.
+def _animator(doll: Ragdoll, entry: dict, folder: Path) -> Callable[[Placement], Placement]:
+    """Return what gives a placement the animation of a doll's entry; with a ``time``, the pose and
+    velocities of the animation at that time, limp.
     """
     for key in ('spin', 'follow', *ANGLE_KEYS.values()):
         if key in entry:
             raise WrongForm(key, entry[key], 'none: the animation has its own')
     wanted = entry['animation']
-    animation = _animation(copies[0].doll, wanted, folder)
+    animation = _animation(doll, wanted, folder)
     playing = {key: wanted[key] for key in PLAYBACK_KEYS if key in wanted}
     if 'time' in wanted and playing:
         raise WrongForm('animation.time', wanted['time'], 'either time, to start limp, or '
                         + ', '.join(playing))
     try:
-        if 'time' in wanted:
-            motion = animation.at(wanted['time'])
-            return [placed(copy, motion) for copy in copies]
-        return [animation.play(copy, **playing) for copy in copies]
+        motion = animation.at(wanted['time']) if 'time' in wanted else None
     except ModelError as error:
         raise error.at('animation') from None
+
+    def animate(placement: Placement) -> Placement:
+        try:
+            return (animation.play(placement, **playing) if motion is None
+                    else placed(placement, motion))
+        except ModelError as error:
+            raise error.at('animation') from None
+
+    return animate
 
 
 def _animation(doll: Ragdoll, wanted: dict, folder: Path) -> Animation:
