@@ -4,13 +4,14 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import threading
 import time
 
 import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from page_client import START, batch_of, has_all, served, wait
+from page_client import PATIENCE, START, batch_of, has_all, served, wait
 
 from ragdoll_ros.files.limits import load_limits
 from ragdoll_ros.files.scene import load_scene
@@ -173,6 +174,67 @@ def test_arrow_keys_push(page, label, axis, sign):
     # Its feet strike the ground after 0.28 s.
     assert frame.time > 0.25 or 0.5 < momentum[axis] * sign / masses.sum() < 1.2
     wait(lambda: not arrow.visible)
+
+
+class NotedSource(SimulationSource):
+    """Notes what users do."""
+
+    def __init__(self):
+        self.done = []
+        super().__init__(DROP)
+
+    def step(self):
+        self.done.append('step')
+
+    def reset(self):
+        self.done.append('reset')
+
+    def go_limp(self):
+        self.done.append('go limp')
+
+    def set_strength(self, strength):
+        self.done.append(strength)
+
+    def grab(self, hand, bone, point, target):
+        self.done.append('grab')
+
+    def let_go(self, hand):
+        self.done.append('let go')
+
+    def push(self, force, duration):
+        self.done.append('right' if force[1] > 0 else 'left')
+
+
+def test_what_users_do_is_done_in_their_order():
+    """Bar, hotkeys, buttons, a slider, the pointer and arrow keys, after a step that waits, as one
+    does that ends editing: a push that follows a reset must not be undone by it.
+    """
+    go_on = threading.Event()
+    with served(NotedSource()) as page:
+        client, controls = page.open(), page.controls
+        wait(lambda: page.editor is not None)
+        look_from_the_front(page, client)
+        node, number, place = batch_of(page, 'torso')
+        page.transport.before_step = lambda: go_on.wait(PATIENCE)
+        client.steer(page, 'step')
+        client.press(page, 'Push right')
+        client.steer(page, 'reset')
+        client.press(page, 'Push left')
+        client.press(page, 'Reset')
+        client.update(controls.go_limp, True)
+        client.update(controls.motor_strength, 0.5)
+        client.drag(node, 'start', place, place, number)
+        client.steer(page, 'reset')
+        client.drag(node, 'end', place, place, number)
+        client.update(controls.pushes.key_events, '0 right')
+        client.update(controls.pushes.strength, 350.0)
+        wait(lambda: controls.pushes.strength.value == 350)  # so all has arrived
+        assert not page.source.done
+        go_on.set()
+        due = ['step', 'right', 'reset', 'left', 'reset', 'go limp', 0.5, 'grab', 'reset', 'let go',
+               'right']
+        wait(lambda: len(page.source.done) >= len(due))
+        assert page.source.done[:len(due)] == due, 'a key that is down pushes on'
 
 
 def test_a_key_that_comes_again_and_again_is_held(page):

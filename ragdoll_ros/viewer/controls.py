@@ -13,6 +13,7 @@ from ..physics.engine.registry import ENGINES
 from .pushing.ball import BallThrower
 from .pushing.push_keys import PushKeys
 from .sources.source import Frame, Source, SourceStatus
+from .user_actions import UserActions
 
 FIRST_SCENES = {'Doll': 'drop', 'Person': 'man_faints', 'Skin': 'character_falls',
                 'Hair': 'ponytail', 'Crowd': 'crowd'}
@@ -25,8 +26,8 @@ OTHER = '(other)'
 class Controls:
     """Widgets in the GUI container that is current."""
 
-    def __init__(self, server: viser.ViserServer, source: Source) -> None:
-        self.source = source
+    def __init__(self, server: viser.ViserServer, source: Source, actions: UserActions) -> None:
+        self.source, self._actions = source, actions
         self.loading = ''
         """Name of the scene that is being loaded; empty if none is."""
         self.before_load: Callable[[], None] = lambda: None
@@ -37,7 +38,7 @@ class Controls:
         """Scene and number of the run of the newest frame."""
         self._loop = server.get_event_loop()
         gui, is_simulated = server.gui, source.recording is None
-        self.pushes = PushKeys(server, source)
+        self.pushes = PushKeys(server, source, actions)
         self.ball = BallThrower(server, source)
         self.go_limp = gui.add_button(
             'Go limp', visible=False, hint='End animations and motors: the doll falls, from its '
@@ -108,13 +109,13 @@ class Controls:
         self._try(client, load, lambda: self.show_scene(self._shown_scene))
 
     async def _on_go_limp(self, _: viser.GuiEvent) -> None:
-        """End animations and motors; in viser's thread, so that it comes before a later step."""
-        self.source.go_limp()
+        """End animations and motors."""
+        self._actions.run(self.source.go_limp)
 
     async def _on_motor_strength(self, event: viser.GuiEvent) -> None:
-        """Set the strength that a page has chosen; in viser's thread, as _on_go_limp."""
+        """Set the strength that a page has chosen, which is read before a reset changes it."""
         if event.client is not None:
-            self.source.set_strength(event.target.value)
+            self._actions.run(self.source.set_strength, event.target.value)
 
     async def _on_scene(self, event: viser.GuiEvent) -> None:
         """Load the chosen scene, whose name is read before the page can overwrite it."""

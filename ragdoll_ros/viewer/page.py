@@ -29,6 +29,7 @@ from .sources.source import Frame, RequestedData, Source, SourceStatus
 from .start_when_visible import StartWhenVisible
 from .timeline.timeline import Timeline
 from .timeline.transport import Transport
+from .user_actions import UserActions
 from .viser_internals import sent_at_once, wait_until_sent
 from .widgets.form import GREY, RED, colored
 
@@ -94,12 +95,12 @@ class Page:
                      script('upload_notices.js'), script('decimal_comma.js')):
             server.gui.add_html(html)
         self._edit_banner = Banner(server.gui)
-        self.timeline = Timeline(source)
-        self.transport = Transport(server, source, self.timeline)
+        self.timeline, actions = Timeline(source), UserActions()
+        self.transport = Transport(server, source, self.timeline, actions)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
-            self.controls = Controls(server, source)
+            self.controls = Controls(server, source, actions)
             self.display = DisplayOptions(server)
             self.settings = SettingsPanel(server, source)
             self.display.on_home(lambda client: self.cameras.go_home(client))
@@ -121,7 +122,8 @@ class Page:
         self.controls.ball.refuse = self.transport.refuse
         self.controls.ball.is_editing = lambda: self.editor is not None and self.editor.editing
         self.controls.ball.connect(server, self._hover)
-        self._pointer = Pointer(source, self._grabbable_frame, self._select, self.transport.refuse)
+        self._pointer = Pointer(source, actions, self._grabbable_frame, self._select,
+                                self.transport.refuse)
         self.controls.pushes.may_push = lambda: self.timeline.is_live
         self.controls.pushes.refuse = self.transport.refuse
 

@@ -18,6 +18,7 @@ from ..model.state import State
 from .drawing.bodies import Bodies
 from .drawing.skin_meshes import SkinMeshes
 from .sources.source import Frame, Source
+from .user_actions import UserActions
 from .viser_internals import connections
 
 PING_PERIOD = 0.5
@@ -39,10 +40,11 @@ class Pointer:
     Viser's callbacks are coroutines here, so that they run in order; they must not block.
     """
 
-    def __init__(self, source: Source, grabbable_frame: Callable[[], Frame | None],
-                 select: Callable[[str, bool], None],
+    def __init__(self, source: Source, actions: UserActions,
+                 grabbable_frame: Callable[[], Frame | None], select: Callable[[str, bool], None],
                  refuse: Callable[[viser.ClientHandle], None] = lambda _: None) -> None:
-        self._source, self._frame, self._select = source, grabbable_frame, select
+        self._source, self._actions = source, actions
+        self._frame, self._select = grabbable_frame, select
         self._refuse = refuse
         """Tells a page why it cannot grab anything."""
         self._distances: dict[int, float] = {}
@@ -66,7 +68,7 @@ class Pointer:
                 self._unwatch(event)
                 self._let_go(event)
             elif event.client_id in self._distances:
-                self._source.drag(_hand(event), self._target(event))
+                self._actions.run(self._source.drag, _hand(event), self._target(event))
 
         async def on_click(event: viser.SceneNodePointerEvent) -> None:
             frame = self._frame()
@@ -89,8 +91,8 @@ class Pointer:
         eye = event.client.camera.position
         self._distances[event.client_id] = float(np.linalg.norm(point - eye))
         local = to_bone_frame(frame.scene, frame.state, bone, point)
-        self._source.grab(_hand(event), frame.scene.bone_names[bone], tuple(local.tolist()),
-                          self._target(event))
+        self._actions.run(self._source.grab, _hand(event), frame.scene.bone_names[bone],
+                          tuple(local.tolist()), self._target(event))
         self._watch(event)
 
     def _watch(self, event: viser.SceneNodeDragEvent) -> None:
@@ -109,7 +111,7 @@ class Pointer:
 
     def _let_go(self, event: viser.SceneNodeDragEvent) -> None:
         if self._distances.pop(event.client_id, None) is not None:
-            self._source.let_go(_hand(event))
+            self._actions.run(self._source.let_go, _hand(event))
 
     def _target(self, event: viser.SceneNodeDragEvent) -> tuple[float, ...]:
         target = target_at_distance(event.client.camera.position, np.array(event.end_position),

@@ -14,6 +14,7 @@ from ...realtime.arrow_keys import ARTICLE, DIRECTIONS, FORCE, TAP, PressedKeys
 from ...realtime.speed_limit import RESPONSE_TIME, TOP_SPEED, TOP_SPEEDS, SpeedLimit
 from ..browser.scripts import add_listener
 from ..sources.source import Frame, Source
+from ..user_actions import UserActions
 from .directions import seen_from
 from .motion import Motion
 
@@ -33,7 +34,7 @@ REPEAT_PERIOD = 0.04
 class PushKeys:
     """Buttons, keys and sliders in the current GUI container; hidden for a recording."""
 
-    def __init__(self, server: viser.ViserServer, source: Source) -> None:
+    def __init__(self, server: viser.ViserServer, source: Source, actions: UserActions) -> None:
         self.motion = Motion()
         self.may_push: Callable[[], bool] = lambda: True
         self.refuse: Callable[[viser.ClientHandle | None], None] = lambda _: None
@@ -46,8 +47,8 @@ class PushKeys:
         self._next_repeat = 0.0
         self._is_pushing = False
         gui, can_push = server.gui, source.recording is None
-        self.key_events = add_listener(gui, 'keys', 'arrow_keys.js', lambda page, down: self.take(
-            page, down.split(), time.monotonic()))
+        self.key_events = add_listener(gui, 'keys', 'arrow_keys.js', lambda page, down: actions.run(
+            self.take, page, down.split(), time.monotonic()))
         buttons = gui.add_button_group(
             'Push', tuple(ARROWS), visible=can_push, hint='As seen in the picture: left, away from '
             'you, towards you, right; arrow keys do the same, and go on while held')
@@ -61,10 +62,15 @@ class PushKeys:
         self._shown_effect: tuple = ()
         """What the text of `_effect` depends on."""
         self.strength.on_update(lambda _: self._show_effect())
-        buttons.on_click(lambda event: self.tap(event.client, ARROWS[event.target.value]))
         for arrow in ARROWS.values() if can_push else ():
             command = gui.add_command(f'Push {arrow}')
-            command.on_trigger(lambda event, arrow=arrow: self.tap(event.client, arrow))
+            command.on_trigger(actions.callback(
+                lambda event, arrow=arrow: self.tap(event.client, arrow)))
+
+        @buttons.on_click
+        async def _(event: viser.GuiEvent) -> None:
+            # The arrow is read before another click changes it.
+            actions.run(self.tap, event.client, ARROWS[event.target.value])
 
         @server.on_client_disconnect
         def _(client: viser.ClientHandle) -> None:

@@ -1,11 +1,9 @@
 """The transport bar below the picture: play, step, reset, speed, time, and what is shown."""
 from __future__ import annotations
 
-import asyncio
 import json
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import viser
@@ -13,6 +11,7 @@ import viser
 from ..browser.scripts import add_listener
 from ..browser.scripts import source as script_source
 from ..sources.source import REAL_TIME_FACTORS, Frame, Source, SourceStatus
+from ..user_actions import UserActions
 from ..viser_internals import run_script
 from .rest import Rest
 from .strip import strip
@@ -56,7 +55,8 @@ class Shown:
 class Transport:
     """The bar of all pages, its keys, and what they do."""
 
-    def __init__(self, server: viser.ViserServer, source: Source, timeline: Timeline) -> None:
+    def __init__(self, server: viser.ViserServer, source: Source, timeline: Timeline,
+                 actions: UserActions) -> None:
         self._server, self._source, self._timeline = server, source, timeline
         self.before_step: Callable[[], None] = lambda: None
         """Called before a single tick is requested."""
@@ -68,15 +68,14 @@ class Transport:
         """What each page shows."""
         self._rest = Rest()
         self._updated = 0.0
-        self._worker = ThreadPoolExecutor(1, 'transport')
         gui = server.gui
-        self.events = add_listener(gui, 'transport', 'transport.js', self._take,
-                                   STYLE=script_source('transport.css'))
+        self.events = add_listener(gui, 'transport', 'transport.js', lambda page, text: actions.run(
+            self._act, page, text), STYLE=script_source('transport.css'))
         for label, key, action in (('Play or pause', 'space', self.toggle),
                                    ('Step', 'N', self.step), ('Step back', 'B', self.step_back),
                                    ('Reset', 'R', source.reset), ('Live', 'L', timeline.go_live)):
             command = gui.add_command(label, hotkey=key)
-            command.on_trigger(lambda _, action=action: action())
+            command.on_trigger(actions.callback(lambda _, action=action: action()))
 
         @server.on_client_disconnect
         def _(client: viser.ClientHandle) -> None:
@@ -164,15 +163,8 @@ class Transport:
         if client is not None:
             run_script(client, f'window.ragdollTimeNote?.({json.dumps(text)});')
 
-    def _take(self, page: int, text: str) -> None:
-        """Take an event of transport.js in viser's thread.
-
-        Act on events in another thread, in order, because steps wait.
-        """
-        asyncio.get_running_loop().run_in_executor(self._worker, self._act, page, text)
-
     def _act(self, page: int, text: str) -> None:
-        """Do what ``text`` names, with a number if it needs one."""
+        """Do what an event of transport.js names, with a number if it needs one."""
         action, _, number = text.partition(' ')
         actions: dict[str, Callable[[], None]] = {
             'toggle': self.toggle, 'step': self.step, 'back': self.step_back,
