@@ -217,7 +217,7 @@ def test_copies_run_where_each_is_turned(tmp_path, doll):
 
 @pytest.mark.parametrize('start', [f'time: {TIME}', f'start: {TIME}', f'speed: 2, start: {TIME}'])
 def test_copies_are_turned_about_the_centre_of_mass_that_the_animation_has(tmp_path, doll, start):
-    """Of `run`, which has gone 2 m by then: whichever way the copies face, they stand in a grid."""
+    """`run` has moved 2 m by then. Whichever way the copies face, their centres form a grid."""
     copies = load_scene(scene_file(
         tmp_path, doll, animation=f'{{name: run, {start}}}', position=[1, 2, 0.5],
         orientation=[0.1, 0.2, 0.3, 0.9], velocity=[0.5, 0, 0],

@@ -142,7 +142,7 @@ def test_all_that_is_entered_counts_however_long_a_change_takes(desk, typed, mas
         assert begun.acquire(timeout=60)
     enter(desk, *typed[2])
     go_on.release(2)
-    desk.editor._in_order.submit(int).result(60)
+    desk.editor._actions.run(int).result(60)
     assert (desk.bone('left_shin').mass, desk.bone('left_shin').friction) == (mass, friction)
     assert desk.bone('left_shin').restitution == (0.25 if typed[2][0] == 'restitution' else None)
 

@@ -19,7 +19,6 @@ from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.fit.skin import skin_of
 from ragdoll_ros.model import errors, rotation
-from ragdoll_ros.model.pose import Pose
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene, above_ground
 from ragdoll_ros.model.shapes import Sphere
@@ -56,7 +55,7 @@ CASES = {'hair by its name': (strands, of_hair),
 
 def stands(placement):
     """Pose of a doll's frame in the world at the start."""
-    return Pose(np.array(placement.position), np.array(placement.orientation))
+    return placement.pose
 
 
 class Run:

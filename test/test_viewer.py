@@ -176,8 +176,8 @@ def test_arrow_keys_push(page, label, axis, sign):
     wait(lambda: not arrow.visible)
 
 
-class NotedSource(SimulationSource):
-    """Notes what users do."""
+class LoggingSource(SimulationSource):
+    """Logs actions of users in place of performing them."""
 
     def __init__(self):
         self.done = []
@@ -205,12 +205,12 @@ class NotedSource(SimulationSource):
         self.done.append('right' if force[1] > 0 else 'left')
 
 
-def test_what_users_do_is_done_in_their_order():
+def test_actions_of_users_run_in_their_order():
     """Bar, hotkeys, buttons, a slider, the pointer and arrow keys, after a step that waits, as one
-    does that ends editing: a push that follows a reset must not be undone by it.
+    does that ends editing: a reset must not cancel a push that follows it.
     """
     go_on = threading.Event()
-    with served(NotedSource()) as page:
+    with served(LoggingSource()) as page:
         client, controls = page.open(), page.controls
         wait(lambda: page.editor is not None)
         look_from_the_front(page, client)

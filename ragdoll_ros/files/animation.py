@@ -18,7 +18,6 @@ from ..model.forward_kinematics import BoneMotion
 from ..model.inverse_kinematics import FollowedMotion, follow_motions, follow_turns
 from ..model.motion_spline import MotionSpline
 from ..model.playback import Playback
-from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement
 from .bvh.doll_motion import read_bvh_motion
@@ -150,7 +149,7 @@ def placed(placement: Placement, motion: FollowedMotion) -> Placement:
             raise errors.WrongForm(key, value, 'none: the animation has its own')
     if unknown := motion.distances.keys() - {bone.name for bone in placement.doll.bones}:
         raise errors.WrongForm('doll', placement.doll.name, f'a doll with the bone {min(unknown)}')
-    frame = Pose(np.array(placement.position), np.array(placement.orientation))
+    frame = placement.pose
     pose = frame.compose(motion.pose)
     velocity = np.array(placement.velocity) + rotation.rotate(frame.orientation, motion.velocity)
     return dataclasses.replace(

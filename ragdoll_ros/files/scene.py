@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..model.errors import (
     ModelError,
     ModelErrors,
@@ -22,7 +20,6 @@ from ..model.errors import (
 from ..model.motors import Motors
 from ..model.per_doll import PerDoll
 from ..model.playback import Playback
-from ..model.pose import Pose
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
@@ -213,9 +210,8 @@ def _copies(doll: Ragdoll, entry: dict, folder: Path) -> list[Placement]:
     animated = animate(first)
     if 'repeat' not in entry:
         return [animated]
-    frame, start = (Pose(np.array(each.position), np.array(each.orientation))
-                    for each in (first, animated.start))
-    center = frame.apply_inverse(start.apply(animated.start.mass_centre))
+    start = animated.start
+    center = first.pose.apply_inverse(start.pose.apply(start.mass_centre))
     return [animate(copy) for copy in repeated(first, entry['repeat'], center)]
 
 
@@ -251,8 +247,8 @@ def _motors_data(motors: Motors) -> dict:
 
 
 def _animator(doll: Ragdoll, entry: dict, folder: Path) -> Callable[[Placement], Placement]:
-    """Return what gives a placement the animation of a doll's entry; with a ``time``, the pose and
-    velocities of the animation at that time, limp.
+    """Return a function that gives a placement the animation of a doll's entry: to play, or with a
+    ``time``, limp with the pose and velocities at that time.
     """
     for key in ('spin', 'follow', *ANGLE_KEYS.values()):
         if key in entry:

@@ -189,6 +189,11 @@ class Placement:
         return self if self.animation is None else _started(self, self.animation)
 
     @property
+    def pose(self) -> Pose:
+        """Initial pose of the doll's frame, or of its animation's, world frame."""
+        return Pose(np.array(self.position), np.array(self.orientation))
+
+    @property
     def is_posed(self) -> bool:
         """Whether it starts with joint angles or rates, or with an animation."""
         return bool(self.angles or self.rates or self.animation)
@@ -198,7 +203,7 @@ class Placement:
         if self.animation is not None:
             return self.start.bone_pose(bone)
         here = self._motions[bone.name].pose(bone) if self.angles else bone.pose
-        return Pose(np.array(self.position), np.array(self.orientation)).compose(here)
+        return self.pose.compose(here)
 
     @property
     def mass_centre(self) -> np.ndarray:
@@ -258,8 +263,7 @@ class Placement:
 def _started(placement: Placement, animation: Playback) -> Placement:
     """The placement as its animation has it at the start, without the animation."""
     alone, doll = replace(placement, animation=None), placement.doll
-    state = animation.at(Pose(np.array(alone.position), np.array(alone.orientation)),
-                         np.array(alone.velocity), 0.0)
+    state = animation.at(alone.pose, np.array(alone.velocity), 0.0)
     q, layout = state.q, animation.motion.layout
     root = Pose(q[layout.root_positions[0]], q[layout.root_orientations[0]])
     frame = root.compose(doll.root.pose.relative(Pose()))

@@ -1,33 +1,34 @@
-"""Runs what users do on pages in the order in which they do it."""
+"""Runs actions of users, such as pushes and resets, in the order in which pages send them."""
 from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import ParamSpec, TypeVar
+from typing import TypeVar
 
 Event = TypeVar('Event')
-Args = ParamSpec('Args')
 
 
 class UserActions:
-    """Runs actions one after another, in a thread of its own.
+    """A queue of actions with one worker thread.
 
-    Viser calls callbacks that are no coroutines in many threads: a push could overtake the reset
-    before it, which then undid it. Coroutines keep the order but must not wait, as a step does that
-    ends editing.
+    Viser runs each callback in a pool of threads, so a push could overtake an earlier reset, which
+    then cancelled it. Coroutines run in order, in viser's event loop, but must not block; a step
+    that ends editing does.
     """
 
     def __init__(self) -> None:
         self._worker = ThreadPoolExecutor(1, 'actions')
 
-    def run(self, action: Callable[Args, object], *args: Args.args, **kwargs: Args.kwargs) -> None:
-        """Run an action after all before it; returns at once. Its errors are printed."""
-        self._worker.submit(action, *args, **kwargs).add_done_callback(_print_error)
+    def run(self, action: Callable[..., object], *args: object) -> Future:
+        """Queue an action; returns its future. An exception of it is printed."""
+        done = self._worker.submit(action, *args)
+        done.add_done_callback(_print_error)
+        return done
 
     def callback(self, action: Callable[[Event], object]
                  ) -> Callable[[Event], Coroutine[None, None, None]]:
-        """Return what viser calls in its thread with an event, on which the action is run."""
+        """Return a callback for viser that queues ``action`` with its event."""
         async def take(event: Event) -> None:
             self.run(action, event)
 

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from ...model.dof_layout import GeneralizedState
-from ...model.pose import Pose
 from ...model.scene import SECOND, Placement, Scene
 from ...model.scene_change import SceneChange
 from ...model.state import State
@@ -54,7 +53,7 @@ class _Animated:
 
     def _evaluate(self, time: int, further: int = 0) -> GeneralizedState:
         """See Playback.at()."""
-        frame = Pose(np.array(self.placement.position), np.array(self.placement.orientation))
+        frame = self.placement.pose
         return self.placement.animation.at(frame, np.array(self.placement.velocity),
                                            (time - self.begin) / SECOND, further / SECOND)
 

@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from ...model import errors
 from ...model.ragdoll import Limits
 from ...model.scene import Scene
 from ..browser.scripts import add_listener
+from ..user_actions import UserActions
 from ..viser_internals import handle_id
 from ..widgets.error_text import error_text
 from ..widgets.form import FormValues
@@ -47,8 +47,8 @@ class Editor:
         self._action_lock = threading.RLock()
         self._edited = EditedScene(scene, set_scene, pause, self._on_scene)
         self._display_lock = self._edited.lock
-        self._in_order = ThreadPoolExecutor(1)
-        """Runs what is entered by keys, one after the other."""
+        self._actions = UserActions()
+        """Actions by keys. Apart from those of the page, as building a scene may take long."""
         self._waiting = 0
         """Number of forms that were entered and are not applied yet."""
         self._was_paused = False
@@ -60,7 +60,7 @@ class Editor:
         """Name of the static body that is selected, in place of bones."""
         self.editing = False
         """Whether the source is paused in the bind pose."""
-        self.ranges = JointHandles(server, lambda limits: self._in_order.submit(
+        self.ranges = JointHandles(server, lambda limits: self._actions.run(
             self._on_limits, limits))
         self.handles = BodyHandles(server, self.ranges, self._on_pose, self._on_size)
         self.panel = EditorPanel(server.gui, self.select, self.select_static, self.suggest)
@@ -246,18 +246,18 @@ class Editor:
     def _on_action(self, action: str) -> None:
         """Start or end editing, or choose what the handles change; see Banner."""
         if action in MODES:
-            self._in_order.submit(self.set_mode, action)
+            self._actions.run(self.set_mode, action)
         elif (action == 'edit') != self.editing:
-            self._in_order.submit(self.toggle)
+            self._actions.run(self.toggle)
 
     def _on_enter(self, field: str) -> None:
         """Apply the form of a field in which Enter was pressed, or add what the field names."""
         if self.panel.has(field):
             self._enter_form()
         elif field == handle_id(self.panel.name):
-            self._in_order.submit(self.add_bone, self.panel.name.value)
+            self._actions.run(self.add_bone, self.panel.name.value)
         elif field == handle_id(self.panel.static_name):
-            self._in_order.submit(self.add_static, self.panel.static_name.value)
+            self._actions.run(self.add_static, self.panel.static_name.value)
         else:
             self.on_other_enter(field)
 
@@ -265,7 +265,7 @@ class Editor:
         """Apply the current content of the form in another thread, while a user may type on."""
         with self._display_lock:
             self._waiting += 1
-            self._in_order.submit(self._apply_next, *self._typed())
+            self._actions.run(self._apply_next, *self._typed())
 
     def _typed(self) -> tuple[tuple[str, ...], FormValues, list[errors.ModelError]]:
         """The selected bones, the values of the form, and errors of those that cannot be read."""
